@@ -3,11 +3,13 @@
 
 #include <algorithm>
 #include <bit>
+#include <iterator>
 
 #include "edgetree/forest/forest_build.h"
 #include "edgetree/forest/forest_choice.h"
 #include "edgetree/forest/forest_query.h"
 #include "edgetree/forest/forest_rejection.h"
+#include "edgetree/forest/root_boxes.h"
 #include "edgetree/lobe/seen_edge.h"
 
 namespace limn {
@@ -44,6 +46,8 @@ struct EdgeForest::Impl {
   LightClusters lights;
   Forest forest;
   ShapeId crossings;  // the first object whose ends are not floats, or none: after all shapes
+  // Of trees but those of textures, which are no outlines.
+  RootBoxes boxes, moving_boxes;
 
   ForestQuery prepare(const EdgeQuery& query) const {
     const bool lit = config.light_term && !lights.empty();
@@ -97,8 +101,8 @@ struct EdgeForest::Impl {
     const Reached here = is_root ? Reached{1, nodes.find_root(id)}
                                  : reach(static_cast<NodeId>(parent / kWidth),
                                          static_cast<int>(parent % kWidth), query, nodes);
-    if (here.probability == 0) return {0, ExpandedNodes::kNotExpanded};
     const bool is_expanded = here.expanded != ExpandedNodes::kNotExpanded;
+    if (here.probability == 0 || (is_root && !is_expanded)) return {0, ExpandedNodes::kNotExpanded};
     const Choice choice =
         is_expanded ? nodes.choice(here.expanded) : choice_at(forest, config, query, id);
     const double scale = is_root ? nodes.total() : choice.total;
@@ -143,9 +147,22 @@ std::unique_ptr<EdgeForest> EdgeForest::build(const EdgeSamplerInput& input, int
     ++first;
   }
   const ShapeId crossings = first < input.objects.size() ? ShapeId(first) : ShapeId::none();
-  auto impl =
-      std::unique_ptr<Impl>(new Impl{input, config, LightClusters(input.lights, uniform_luminance),
-                                     build_forest(input, threads, config), crossings});
+  auto impl = std::unique_ptr<Impl>(new Impl{input,
+                                             config,
+                                             LightClusters(input.lights, uniform_luminance),
+                                             build_forest(input, threads, config),
+                                             crossings,
+                                             {},
+                                             {}});
+  const auto outlines_of = [&](const std::vector<NodeId>& roots) {
+    std::vector<NodeId> some;
+    std::ranges::copy_if(roots, std::back_inserter(some), [&](NodeId root) {
+      return !input.object(impl->forest.head(root).object).of_texture();
+    });
+    return RootBoxes(impl->forest, some);
+  };
+  impl->boxes = outlines_of(impl->forest.roots);
+  impl->moving_boxes = outlines_of(impl->forest.moving_roots);
   return std::unique_ptr<EdgeForest>(new EdgeForest(std::move(impl)));
 }
 
@@ -234,10 +251,9 @@ bool EdgeForest::list_outlines(const EdgeQuery& query, const DirectionCone& dire
   const ForestCone cone(forest, query, directions, input.lane_scale);
   const OwnEdges own(input, query, forest.extent);
   static thread_local std::vector<NodeId> stack;
-  stack.clear();
-  for (auto root = forest.roots.rbegin(); root != forest.roots.rend(); ++root) {
-    if (!input.object(forest.head(*root).object).of_texture()) stack.push_back(*root);
-  }
+  const RootBoxes& boxes = cone.at_rest ? impl_->moving_boxes : impl_->boxes;
+  boxes.find(query.p, query.n, directions, stack);
+  std::reverse(stack.begin(), stack.end());
   while (!stack.empty()) {
     const NodeId id = stack.back();
     stack.pop_back();

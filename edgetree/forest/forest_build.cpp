@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 #include "edgetree/forest/forest_query.h"
@@ -286,6 +287,10 @@ Forest build_forest(const EdgeSamplerInput& input, int threads, const ForestConf
         set_speeds(input.object(object), input.lane_scale, forest.motions[object.index()], wedges);
         append_tree(wedges, object, group, threads, config, forest);
       });
+  const auto moves = [&](NodeId root) {
+    return bits((root < 0 ? forest.edges[~root].speed : forest.inner[root].speed) > 0) != 0;
+  };
+  std::ranges::copy_if(forest.roots, std::back_inserter(forest.moving_roots), moves);
   return forest;
 }
 

@@ -126,7 +126,8 @@ void ExpandedNodes::expand(const Forest& forest, const ForestConfig& config,
   nodes_.clear();
   uncertain_.clear();
   double sum = 0;
-  for (const NodeId root : forest.roots) sum += add(trees, root, kNotExpanded, 0).total;
+  for (const NodeId root : forest.roots_for(query.at_rest))
+    sum += add(trees, root, kNotExpanded, 0).total;
   roots_ = nodes_.size();
   const int most = query.lobe.det() > kNarrow ? config.most_open : 0;
   const auto child_of = [&](const Uncertainty& uncertainty) {
@@ -167,9 +168,9 @@ int ExpandedNodes::draw_root(double& u) const {
 }
 
 int ExpandedNodes::find_root(NodeId id) const {
-  int root = 0;
-  while (nodes_[static_cast<size_t>(root)].choice.node != id) ++root;
-  return root;
+  const auto begin = nodes_.begin(), end = begin + static_cast<std::ptrdiff_t>(roots_);
+  const auto found = std::find_if(begin, end, [&](const Node& n) { return n.choice.node == id; });
+  return found == end ? kNotExpanded : static_cast<int>(found - begin);
 }
 
 void ForestWalk::begin(const Forest& forest, const ForestConfig& config, const ForestQuery& query,

@@ -47,7 +47,7 @@ class ExpandedNodes {
   static constexpr int kNotExpanded = -1;
   // The expanded node of a child, or kNotExpanded.
   int child(int node, int lane) const { return nodes_[static_cast<size_t>(node)].expanded[lane]; }
-  // A root; roots are always expanded.
+  // A root: they are always expanded, but for those without an edge that moves: kNotExpanded.
   int find_root(NodeId id) const;
 
  private:

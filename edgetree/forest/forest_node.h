@@ -75,11 +75,16 @@ struct Forest {
   std::vector<InnerNode> inner;
   std::vector<EdgeNode> edges;
   std::vector<NodeId> roots;
+  std::vector<NodeId> moving_roots;   // of them, those with edges that move by themselves
   std::vector<ObjectMotion> motions;  // of the objects
   double extent = 0;                  // largest |x| of a position
   // [object][edge]: kWidth * edge node + index of the child, or kNoParent.
   std::vector<std::vector<uint32_t>> slots;
 
+  // All edges that move as seen from a point are below these; at_rest: see is_at_rest.
+  const std::vector<NodeId>& roots_for(bool at_rest) const {
+    return at_rest ? moving_roots : roots;
+  }
   // Prefetches the cache lines of a node.
   void fetch(NodeId id) const {
     const void* node = id < 0 ? static_cast<const void*>(&edges[~id]) : &inner[id];

@@ -337,6 +337,11 @@ static void split(const Vec3d& p, float unit, float (&parts)[2][3]) {
   }
 }
 
+bool is_at_rest(const EdgeQuery& query, const Lanes& lane_scale) {
+  return sum_of_speeds(scaled_velocity(query.velocity, lane_scale)) == 0 &&
+         sum_of_speeds(scaled_velocity(query.turn.rate, lane_scale)) == 0;
+}
+
 ForestQuery::ForestQuery(const Forest& tree, const LightClusters* clusters,
                          const RadiancePyramid* pyramid, const EdgeQuery& query,
                          const EdgeSamplerInput& scene)
@@ -345,7 +350,8 @@ ForestQuery::ForestQuery(const Forest& tree, const LightClusters* clusters,
       lobe(query.lobe, query.n, query.wi),
       environment(pyramid),
       input(scene),
-      asked(query) {
+      asked(query),
+      at_rest(is_at_rest(query, scene.lane_scale)) {
   if (clusters) lights.emplace(*clusters, query.p);
   for (int k = 0; k < 3; ++k) n[k] = static_cast<float>(query.n[k]);
   unit = unit_of(forest, query.p);
@@ -385,8 +391,7 @@ bool surely_candidate(const EdgeNode& node, int lane, const ForestPoint& point) 
 ForestCone::ForestCone(const Forest& forest, const EdgeQuery& query, const DirectionCone& cone,
                        const Lanes& lane_scale)
     : point(point_of(forest, query.p)),
-      at_rest(sum_of_speeds(scaled_velocity(query.velocity, lane_scale)) == 0 &&
-              sum_of_speeds(scaled_velocity(query.turn.rate, lane_scale)) == 0),
+      at_rest(is_at_rest(query, lane_scale)),
       slack(static_cast<float>(cone.slack)),
       unit(unit_of(forest, query.p)) {
   const auto add = [&](const Vec3d& plane) {

@@ -19,6 +19,9 @@ struct ForestPoint {
 ForestPoint point_of(const Forest& forest, const Vec3d& p);
 
 // Query data that do not depend on the node.
+// Whether p and the directions there are static.
+bool is_at_rest(const EdgeQuery& query, const Lanes& lane_scale);
+
 struct ForestQuery {
   // lights, environment: null if not used as weights. Input and query must outlive this
   // object.
@@ -37,6 +40,7 @@ struct ForestQuery {
   bool any_direction = false;  // speed in any direction counts, not only across the line of sight
   const EdgeSamplerInput& input;
   const EdgeQuery& asked;
+  bool at_rest;
   std::optional<Plane> own_plane;  // plane of the query's own face, if any
 
   // Motion of an object as seen from p; valid until the next call.

@@ -84,7 +84,8 @@ BackwardResult run(std::unique_ptr<Estimator> owned, const Image& adjoint,
     ++result.batches;
   });
 
-  if (!kExact && result.spp > 0 && options.find_gaps) {
+  const bool moves = moved_in(estimator.scene(), estimator.parameters().parameters()).any();
+  if (!kExact && moves && result.spp > 0 && options.find_gaps) {
     warn_of_hair_gaps(estimator.scene(), static_cast<double>(result.spp), settings.threads,
                       result.warnings);
   }

@@ -12,7 +12,7 @@ namespace limn {
 
 bool EdgeMotion::moves(EdgeRef id) const {
   if (!is_crossing(id)) return moves(shape_of(id));
-  for (const FaceRef face : input_.object(id.object).faces_around(id.edge))
+  for (const FaceRef face : input_->object(id.object).faces_around(id.edge))
     if (moves(face.shape)) return true;
   return false;
 }
@@ -76,7 +76,7 @@ void EdgeMotion::contribute_face(Tape& tape, FaceRef face, const Vec3d& x, const
 }
 
 void EdgeMotion::contribute_end(Tape& tape, EdgeRef id, int end, const Vec3d& g) const {
-  const EdgeMesh& mesh = input_.object(id.object);
+  const EdgeMesh& mesh = input_->object(id.object);
   const VertexId vertex = mesh.edge(id.edge).vertices[end];
   if (is_crossing(id)) {
     contribute_crossing(tape, id, mesh.position(vertex), g);
@@ -104,7 +104,7 @@ void EdgeMotion::contribute_end(Tape& tape, EdgeRef id, int end, const Vec3d& g)
 // = n x m, with the speeds s and t of the planes along their unit normals n and m, and those are
 // linear in the corners' velocities, each with its barycentric coordinate of x.
 void EdgeMotion::contribute_crossing(Tape& tape, EdgeRef id, const Vec3d& x, const Vec3d& g) const {
-  const auto faces = input_.object(id.object).faces_around(id.edge);
+  const auto faces = input_->object(id.object).faces_around(id.edge);
   std::array<std::array<Vec3d, 3>, 2> corners;
   std::array<Vec3d, 2> area, unit;
   for (int i = 0; i < 2; ++i) {

@@ -33,7 +33,8 @@ class Seeds {
 
 class EdgeMotion {
  public:
-  EdgeMotion(const SceneSlots& slots, const EdgeSamplerInput& input)
+  // input: which edges boundary samples are of; null where there are none.
+  EdgeMotion(const SceneSlots& slots, const EdgeSamplerInput* input)
       : slots_(slots), input_(input) {}
 
   const SceneSlots& slots() const { return slots_; }
@@ -44,8 +45,8 @@ class EdgeMotion {
   void contribute(Tape& tape, Seeds& seeds, const BoundaryForm& form, double weight) const;
 
  private:
-  bool is_crossing(EdgeRef id) const { return !input_.object(id.object).shape.valid(); }
-  ShapeId shape_of(EdgeRef id) const { return input_.object(id.object).shape; }
+  bool is_crossing(EdgeRef id) const { return !input_->object(id.object).shape.valid(); }
+  ShapeId shape_of(EdgeRef id) const { return input_->object(id.object).shape; }
   bool moves(ShapeId shape) const { return slots_.mesh(shape).positions != 0; }
   bool moves(EdgeRef id) const;
   bool moves(const MovingPoint& point) const;
@@ -57,7 +58,7 @@ class EdgeMotion {
   void contribute_vertex(Tape& tape, ShapeId shape, uint32_t vertex, const Vec3d& g) const;
 
   const SceneSlots& slots_;
-  const EdgeSamplerInput& input_;
+  const EdgeSamplerInput* input_;
 };
 
 }  // namespace limn

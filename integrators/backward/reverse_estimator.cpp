@@ -28,21 +28,27 @@ ReverseEstimator::ReverseEstimator(const Scene& scene, const Image& adjoint,
       choice_(film_.pixels(), options.uniform_pixels),
       parameters_(scene, reverse_parameters(scene, options)),
       method_(*options.method->reverse),
-      traced_(parameters_.scene(), threads, {.closed = method_.closed, .edges = true}),
+      moved_(moved_in(scene, parameters_.parameters())),
+      traced_(parameters_.scene(), threads, {.closed = method_.closed, .edges = moved_.any()}),
       input_(traced_.context(), 3, {1, 1, 1, 1}, method_.sampler, threads),
       filter_(scene.film.filter),
-      motion_(parameters_.slots(), input_.edges()),
+      motion_(parameters_.slots(), moved_.any() ? &input_.edges() : nullptr),
       types_(terms_of(parameters_.scene(), method_.sampler, method_.closed)) {
   input_.free = &parameters_.free();
   std::vector<std::string> names;
   for (const TermType* type : types_) names.emplace_back(type->name);
   const auto chosen = selected_terms(names, options.terms, scene.file);
   check_options(options);
+  std::vector<bool> computed;
+  for (const std::string& name : names)
+    computed.push_back(std::find(chosen.begin(), chosen.end(), name) != chosen.end());
+  computed = changed_terms(types_, computed, moved_);
   for (size_t slot = 0; slot < types_.size(); ++slot) {
     if (types_[slot]->traces_paths) pixel_slot_ = slot;
-    const bool computed = std::find(chosen.begin(), chosen.end(), names[slot]) != chosen.end();
-    terms_.push_back(computed ? types_[slot]->make(input_) : nullptr);
-    if (computed) paths_ = paths_ || terms_[slot]->uses_paths() || terms_[slot]->uses_vertices();
+    terms_.push_back(computed[slot] ? types_[slot]->make(input_) : nullptr);
+    if (!terms_[slot]) continue;
+    vertices_ = vertices_ || terms_[slot]->uses_vertices();
+    paths_ = paths_ || terms_[slot]->uses_paths() || vertices_;
   }
 }
 
@@ -69,14 +75,13 @@ void ReverseEstimator::describe(BackwardResult& result) const {
         "shading 'mitsuba' is discontinuous where no edge is: the derivative of interpolated "
         "normals is incomplete");
   }
+  if (!moved_.any()) return;
   warn_of_contacts(scene(), input_.made_edges(), result.warnings);
   warn_of_faces_edge_on(scene(), *traced_.context().viewpoints, result.warnings);
-  const auto& all = parameters_.parameters();
-  if (!std::all_of(all.begin(), all.end(), [](const auto& p) { return p.colour; })) {
-    warn_of_shadows_on_lifted_points(scene(), result.warnings);
-    check_texture_edges(scene(), result.warnings);
-  }
-  const std::string missing = missing_by_chains(traced_.context(), scene(), all);
+  warn_of_shadows_on_lifted_points(scene(), result.warnings);
+  check_texture_edges(scene(), result.warnings);
+  const std::string missing =
+      missing_by_chains(traced_.context(), scene(), parameters_.parameters());
   if (!missing.empty()) result.warnings.push_back(missing);
 }
 
@@ -171,7 +176,7 @@ bool ReverseEstimator::trace(const Path& path, const Rng& key, Tape& tape, Gradi
     RayCount rays;
     ++cost.samples;
     PathTracer<Var, VertexAdjoints> tracer(traced_.context(), rays);
-    Walk<Var, VertexAdjoints> walk(key, 0, &vertices);
+    Walk<Var, VertexAdjoints> walk(key, 0, vertices_ ? &vertices : nullptr);
     const StartRay<Var> start{camera_ray(scene(), still), ray.origin, ray.direction};
     tracer.follow_rays({&start, 1}, {&walk, 1});
     const Rgb<Var>& radiance = walk.sums.radiance;

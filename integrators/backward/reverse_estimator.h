@@ -10,6 +10,7 @@
 #include "integrators/estimates/gradient_estimator.h"
 #include "integrators/paths/traced_scene.h"
 #include "integrators/terms/term.h"
+#include "limn/core/moved.h"
 #include "limn/integrators/methods.h"
 
 namespace limn {
@@ -78,6 +79,7 @@ class ReverseEstimator final : public GradientEstimator {
   PixelChoice choice_;
   ParameterSlots parameters_;
   ReverseMethod method_;
+  Moved moved_;  // by the parameters
   TracedScene traced_;
   TermInput input_;
   FilterTable filter_;
@@ -85,7 +87,7 @@ class ReverseEstimator final : public GradientEstimator {
   std::vector<const TermType*> types_;        // of each slot
   std::vector<std::unique_ptr<Term>> terms_;  // null where not computed
   size_t pixel_slot_ = 0;                     // of the term that traces paths
-  bool paths_ = false;                        // whether some term uses them
+  bool paths_ = false, vertices_ = false;     // whether some term uses them
 };
 
 // Adds what the tape of a sample contributes, and its magnitude: squares are summed over all

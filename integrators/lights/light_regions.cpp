@@ -223,18 +223,70 @@ LightRegions::LightRegions(const Scene& scene) : scene_(scene) {
       region.flat_faces.push_back({region.shape, FaceId(f)});
     }
   }
+  patches_ = regions_.size();
   hold_all_ = !scene.environment;
   leave_out_dim_emitters();
-  if (!scene.environment) return;
-  for (const BrightPatch& patch : find_bright_patches(*scene.environment)) {
+  add_patches();
+  grow_tree();
+}
+
+void LightRegions::add_patches() {
+  if (!scene_.environment) return;
+  for (const BrightPatch& patch : find_bright_patches(*scene_.environment)) {
     Region& region = regions_.emplace_back();
     region.luminance = patch.luminance;
     region.patch = patch;
   }
 }
 
+// Edges before so many emitters are listed; of more, by choice. Not tuned.
+constexpr size_t kMost = 16;
+
+void LightRegions::grow_tree() {
+  size_t moving = 0;
+  const auto moves = [&](const Region& region) {
+    return region.shape.valid() && !scene_.shape(region.shape).mesh.position_tangents.empty();
+  };
+  for (const Region& region : regions_) moving += moves(region);
+  std::vector<LightTree::Emitter> emitters;
+  for (uint32_t k = 0; k < regions_.size(); ++k) {
+    const Region& region = regions_[k];
+    if (k >= patches_ || patches_ <= kMost || (moving <= kMost && moves(region))) {
+      always_.push_back(k);
+      continue;
+    }
+    const double light = region.luminance * region.hull.area;
+    // What is not flat shines in all directions.
+    const bool flat = region.hull.flat;
+    emitters.push_back({region.hull.center, flat ? region.hull.plane.n * light : Vec3d{},
+                        flat ? 0 : light / 4, region.hull.area / kPi, light});
+    in_tree_.push_back(k);
+  }
+  tree_ = LightTree(emitters);
+}
+
+void LightRegions::choose(const Vec3d& p, double u, std::vector<Choice>& choices) const {
+  constexpr double kAny = 0.25;  // chosen whatever they send to p; not tuned
+  choices.clear();
+  const auto count = static_cast<double>(in_tree_.size());
+  for (size_t j = 0; j < kMost && chooses(); ++j) {
+    const double target = (static_cast<double>(j) + u) / kMost;
+    const size_t in_tree =
+        target < kAny ? std::min(static_cast<size_t>(target / kAny * count), in_tree_.size() - 1)
+                      : tree_.choose(p, std::min((target - kAny) / (1 - kAny), 1 - 0x1p-53));
+    // Neighbouring numbers choose the same one again.
+    const uint32_t region = in_tree_[in_tree];
+    if (!choices.empty() && choices.back().region == region) {
+      choices.back().times += 1;
+      continue;
+    }
+    const double probability = kAny / count + (1 - kAny) * tree_.probability(p, in_tree);
+    choices.push_back({region, kMost * probability, 1});
+  }
+  for (const uint32_t region : always_) choices.push_back({region, 1, 1});
+}
+
 void LightRegions::leave_out_dim_emitters() {
-  constexpr size_t kMost = 16;  // not tuned
   if (regions_.size() <= kMost) return;
   const auto light = [](const Region& region) { return region.luminance * region.hull.area; };
   std::vector<double> lights;
@@ -340,8 +392,8 @@ Rgb<double> LightRegions::escaped(size_t k, const Vec3d& w) const {
 }
 
 Rgb<double> LightRegions::escaped(const Vec3d& w) const {
-  for (const Region& region : regions_) {
-    if (!region.shape.valid() && region.patch.holds(w)) return scene_.environment->radiance(w);
+  for (size_t k = patches_; k < regions_.size(); ++k) {
+    if (regions_[k].patch.holds(w)) return scene_.environment->radiance(w);
   }
   return {};
 }

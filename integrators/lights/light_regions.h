@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "integrators/lights/bright_patches.h"
+#include "limn/core/light_tree.h"
 #include "limn/core/scene.h"
 #include "limn/core/shading.h"
 #include "limn/edgetree/edge_sampler.h"
@@ -46,6 +47,15 @@ class LightRegions {
   bool hold_all() const { return hold_all_; }
   // Mean luminance of region k [W / (m^2 sr)], for importance.
   double luminance(size_t k) const { return regions_[k].luminance; }
+  // The regions whose edges are looked for from p: all of few; of many emitters those that move, if
+  // they are few, and 16 draws of the others. u: in [0, 1).
+  struct Choice {
+    uint32_t region;
+    double expected;  // how often it is drawn on average
+    double times;     // it was drawn
+  };
+  void choose(const Vec3d& p, double u, std::vector<Choice>& choices) const;
+  bool chooses() const { return !tree_.empty(); }
   // Its directions from p above the horizon of n; none if it does not shine there.
   std::optional<DirectionCone> cone(size_t k, const Vec3d& p, const Vec3d& n) const {
     const Region& region = regions_[k];
@@ -91,11 +101,17 @@ class LightRegions {
     bool lists_edges = true;
   };
   void leave_out_dim_emitters();
+  void add_patches();
+  void grow_tree();
   // The cap of directions from x that holds region k, unless that is a flat emitter.
   std::optional<DirectionCap> cap_around(const Region& region, const Vec3d& x) const;
 
   const Scene& scene_;
-  std::vector<Region> regions_;
+  std::vector<Region> regions_;    // emitters, then patches
+  size_t patches_ = 0;             // the first of these
+  LightTree tree_;                 // of many emitters; else empty
+  std::vector<uint32_t> in_tree_;  // regions there
+  std::vector<uint32_t> always_;   // all others
   bool hold_all_ = false;
 };
 

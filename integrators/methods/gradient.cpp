@@ -8,8 +8,10 @@
 
 #include "integrators/film/film_regions.h"
 #include "integrators/methods/hair_gaps.h"
+#include "integrators/terms/term.h"
 #include "limn/core/error.h"
 #include "limn/core/field_error.h"
+#include "limn/core/moved.h"
 #include "limn/core/names.h"
 #include "limn/core/parameter.h"
 #include "limn/integrators/methods.h"
@@ -121,7 +123,12 @@ GradientResult gradient(const Scene& scene, const GradientOptions& options,
   GradientResult result = method.run(method, scene, options, settings);
   result.method = method.name;
   check_shading(scene, result);
-  if (options.points == FilmPoints::kFaces) return result;
+  const auto moves = [&](const std::string& name) {
+    const Parameter parameter = find_parameter(scene, name);
+    return moved_in(scene, {&parameter, 1}).any();
+  };
+  if (options.points == FilmPoints::kFaces || std::ranges::none_of(options.parameters, moves))
+    return result;
   warn_of_hair_gaps(scene, static_cast<double>(result.spp), settings.threads, result.warnings);
   return result;
 }

@@ -23,6 +23,7 @@
 #include "integrators/pilot/term_estimator.h"
 #include "limn/core/error.h"
 #include "limn/core/field_error.h"
+#include "limn/core/moved.h"
 #include "limn/core/parameter.h"
 #include "limn/edgetree/edge_sampler_types.h"
 #include "limn/integrators/parts.h"
@@ -81,6 +82,8 @@ constexpr double kFilmConvincing = 0.97;
 constexpr double kFilmPromising = 0.99, kFilmAgainstTurns = 1.25, kTurnsAlone = 0.2;
 // Of a pilot, before positions on the film are looked at; it goes on behind that. Not tuned.
 constexpr int kFirstLook = 8;
+// What pilots may take of a limit of time.
+constexpr double kPilotShare = 1.0 / 8;
 // The most work of the pilot that looks at them, as a share of the run's. Not tuned.
 constexpr double kFilmShare = 1.0 / 4;
 
@@ -99,12 +102,10 @@ class TermJob {
         moves_film_(method.moves_film && !options.exact_film),
         types_(terms_of(scene, method.sampler, method.closed, moves_film_)) {
     const std::vector<std::string> chosen = selected_terms(term_names(), options.terms, scene.file);
-    for (const TermType* type : types_) {
-      computed_.push_back(std::find(chosen.begin(), chosen.end(), type->name) != chosen.end());
-    }
     if (options.samples) check_samples(*options.samples);
     for (const auto& name : options.parameters) parameters_.push_back(find_parameter(scene, name));
-    moves_ = !std::ranges::all_of(parameters_, [](const Parameter& p) { return p.colour; });
+    moved_ = moved_in(scene, parameters_);
+    keep_changed(chosen);
     std::shared_ptr<const FilmRegions> visible;
     if (options.exact_film) {
       visible = std::make_shared<FilmRegions>(scene, settings.threads, settings.interrupted);
@@ -128,14 +129,7 @@ class TermJob {
       pass(p).warn_of_kinks(result.warnings);
     }
     result.at_kink = result.warnings.size() > warned;
-    warn_of_faces_edge_on(scene_, pass(0).viewpoints(), result.warnings);
-    if (moves_) warn_of_shadows_on_lifted_points(scene_, result.warnings);
-    if (moves_) check_texture_edges(scene_, result.warnings);
-    const std::string missing = missing_by_chains(pass(0).context(), scene_, parameters_);
-    result.incomplete = !missing.empty();
-    if (result.incomplete) result.warnings.push_back(missing);
-    for (size_t p = 0; p < passes_.size(); ++p)
-      result.at_kink = result.at_kink || pass(p).viewpoints().cross_planes();
+    warn_of_views(result);
     plan(settings, watch, result);
     if (settings.store) identify_plan(result.terms, *settings.store);
     result.setup_seconds = watch.seconds();
@@ -167,6 +161,36 @@ class TermJob {
   }
 
  private:
+  // The rows of terms that can differ from zero, with their samples.
+  void keep_changed(const std::vector<std::string>& chosen) {
+    const std::vector<const TermType*> all = types_;
+    types_.clear();
+    std::vector<double> samples;
+    for (size_t t = 0; t < all.size(); ++t) {
+      if (!all[t]->changes(moved_)) continue;
+      types_.push_back(all[t]);
+      computed_.push_back(std::find(chosen.begin(), chosen.end(), all[t]->name) != chosen.end());
+      if (options_.samples) samples.push_back((*options_.samples)[t]);
+    }
+    if (options_.samples) samples_ = SampleCounts(samples);
+  }
+
+  void warn_of_views(GradientResult& result) const {
+    const std::string missing = missing_by_chains(pass(0).context(), scene_, parameters_);
+    result.incomplete = !missing.empty();
+    if (result.incomplete) result.warnings.push_back(missing);
+    if (moved_.any()) warn_of_shadows_on_lifted_points(scene_, result.warnings);
+    if (moved_.any()) check_texture_edges(scene_, result.warnings);
+    bool told = false;
+    for (size_t p = 0; p < passes_.size(); ++p) {
+      const Viewpoints* viewpoints = pass(p).viewpoints();
+      if (!viewpoints) continue;
+      if (!told) warn_of_faces_edge_on(scene_, *viewpoints, result.warnings);
+      told = true;
+      result.at_kink = result.at_kink || viewpoints->cross_planes();
+    }
+  }
+
   void describe_warping(GradientResult& result) const {
     TermCost all;
     for (const TermRun& term : result.terms) all.merge(term.cost);
@@ -251,10 +275,10 @@ class TermJob {
     std::vector<double> means(types_.size());
     for (size_t p = 0; p < passes_.size(); ++p) {
       SamplePlan plan;
-      plan.uniform = options_.samples.value_or(SampleCounts{});
+      plan.uniform = samples_.value_or(SampleCounts{});
       if (!options_.samples)
         plan = plan_by_pilot(p, budget_of(p, settings, watch, is_long), result);
-      if (method_.random_directions && can_move_directions()) {
+      if (method_.random_directions && can_move_directions() && !pass(p).motion_rates().still()) {
         plan.grid = PlanGrid(scene_.film, film_size(scene_.film));
         plan.fields = random_fields(plan.grid.size(), pass(p), settings.seed);
         if (can_move_film()) plan.film = random_motions(plan.grid.size(), pass(p), settings.seed);
@@ -362,14 +386,21 @@ class TermJob {
     estimator.set_plan(probing);
     const bool film = film_pilot_samples(settings.spp) > 0 && can_move_film() &&
                       !method_.random_directions && !estimator.motion_rates().still();
-    const int first_look = film ? std::min(spp, kFirstLook) : spp;
-    Probed probed = probe(estimator, turns, first_look, settings, watch);
-    if (film && probed.pilot.spp > 0 &&
+    const double detail = film && budget.timed() ? edges_per_pixel(estimator) : 0;
+    const PilotSize size =
+        size_of_pilot(estimator, turns, film ? std::min(spp, kFirstLook) : spp, detail, budget);
+    Probed probed;
+    if (size.spp > 0) probed = probe(estimator, turns, size, settings, watch);
+    const bool looks =
+        film && probed.pilot.spp > 0 &&
         (!budget.timed() || is_time_for_film({probed.pilot.spp, watch.seconds(), settings.seconds},
-                                             estimator.motion_rates().moves_camera()))) {
-      look_at_film(p, turns, budget, probing, probed);
-      extend(probed, estimator, turns, spp, settings, watch);
+                                             estimator.motion_rates().moves_camera(), detail));
+    if (looks) {
+      look_at_film(p, turns, budget, size, probing, probed);
+      if (!budget.timed() || watch.seconds() < kPilotShare * settings.seconds)
+        extend(probed, estimator, turns, {size.pixels, spp}, settings, watch);
     }
+    if (budget.timed()) describe_pilot(probed, looks, detail, result);
     if (probed.pilot.spp == 0) return plan;
     result.pilot_spp = probed.pilot.spp;
     plan.film = std::move(probing.film);
@@ -377,10 +408,35 @@ class TermJob {
     return plan;
   }
 
+  // In timed runs, of a share of the pixels where samples of all take too long.
+  PilotSize size_of_pilot(const TermEstimator& estimator, bool turns, int spp, double detail,
+                          const Budget& budget) const {
+    const size_t pixels = std::min(film_size(scene_.film) / 3, kMostProbes);
+    if (!budget.timed()) return {pixels, spp};
+    const double each = seconds_of_pixel(estimator, turns, budget.settings, budget.watch);
+    // Two more pilots may follow.
+    const bool several =
+        detail > 0 && (estimator.motion_rates().moves_camera() || detail >= kFilmDetail);
+    const double share = several ? kPilotShare / 3 : kPilotShare;
+    return pilot_size(each, pixels, spp, share * budget.settings.seconds,
+                      budget.settings.seconds - budget.watch.seconds());
+  }
+
+  static void describe_pilot(const Probed& probed, bool looked, double detail,
+                             GradientResult& result) {
+    result.settings.push_back(
+        {"pilot", probed.pilot.spp == 0 ? std::string("none: too few samples fit into the time")
+                                        : fmt::format("{} samples of {} pixels", probed.pilot.spp,
+                                                      probed.pilot.grid.size())});
+    result.settings.push_back(
+        {"film motion", fmt::format("{}looked for; {:.3g} moving edges in a pixel",
+                                    looked ? "" : "not ", detail)});
+  }
+
   // Positions on the film move where pilots with them and without say so; what turns of directions
   // take out is taken out by either.
-  void look_at_film(size_t p, bool turns, const Budget& budget, SamplePlan& plan,
-                    Probed& probed) const {
+  void look_at_film(size_t p, bool turns, const Budget& budget, const PilotSize& size,
+                    SamplePlan& plan, Probed& probed) const {
     TermEstimator& estimator = pass(p);
     const auto& [settings, watch, is_long] = budget;
     const int lanes = estimator.lanes();
@@ -390,14 +446,15 @@ class TermJob {
     const double pixels = static_cast<double>(film_size(scene_.film)) / 3;
     const FilmLook look{film_pilot_samples(settings.spp),
                         kFilmShare * settings.spp * probed.pilot.work_of_pixel() * pixels,
-                        std::min(kFilmPromising, kFilmAgainstTurns * held / not_turned)};
+                        std::min(kFilmPromising, kFilmAgainstTurns * held / not_turned),
+                        size.pixels};
     FilmFit film = fit_film_of(p, plan, look, budget);
     if (!film.motion.empty()) {
       SamplePlan moving = plan;
       moving.grid = film.grid;
       moving.film = std::move(film.motion);
       estimator.set_plan(moving);
-      Probed other = probe(estimator, turns, probed.pilot.spp, settings, watch);
+      Probed other = probe(estimator, turns, {size.pixels, probed.pilot.spp}, settings, watch);
       const double left = other.pilot.spp > 0 ? other.error_times_work(lanes) : 0;
       if (left > 0 && left < kFilmConvincing * held) {
         probed = std::move(other);
@@ -425,8 +482,7 @@ class TermJob {
     look.work /= pairs;
     for (int first = 0; first < estimator.lanes(); first += kMostFilmParameters) {
       const auto some =
-          std::span(parameters)
-              .subspan(first, std::min(kMostFilmParameters, estimator.lanes() - first));
+          parameters.subspan(first, std::min(kMostFilmParameters, estimator.lanes() - first));
       TermEstimator two(scene_, some, types_, computed_, method_.sampler, settings.threads, nullptr,
                         nullptr, false, true);
       if (two.motion_rates().still()) continue;
@@ -444,11 +500,8 @@ class TermJob {
     return fit;
   }
 
-  std::vector<Parameter> parameters_of(size_t p) const {
-    std::vector<Parameter> parameters;
-    for (int k = 0; k < pass(p).lanes(); ++k)
-      parameters.push_back(find_parameter(scene_, options_.parameters[p * kLanes + k]));
-    return parameters;
+  std::span<const Parameter> parameters_of(size_t p) const {
+    return std::span(parameters_).subspan(p * kLanes, static_cast<size_t>(pass(p).lanes()));
   }
 
   // Each parameter counts alike: its variances are divided by their sum. Sets the plan's light
@@ -520,9 +573,10 @@ class TermJob {
   TermMethod method_;
   bool moves_film_;  // whether positions on the film may move
   std::vector<Parameter> parameters_;
-  bool moves_ = false;  // whether any parameter is more than a colour
-  std::vector<const TermType*> types_;
-  std::vector<bool> computed_;  // of each term
+  Moved moved_;                          // by any of the parameters
+  std::vector<const TermType*> types_;   // that can differ from zero
+  std::vector<bool> computed_;           // of each term
+  std::optional<SampleCounts> samples_;  // the options', of each term
   std::vector<std::unique_ptr<SampleEstimator>> passes_;
 };
 

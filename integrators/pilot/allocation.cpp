@@ -79,11 +79,10 @@ constexpr int kMostInPixel = 64;        // not tuned
 // leave less behind when a run is stopped.
 constexpr double kRounding = 1.1;
 
-// Counts before rounding, up to a common factor.
+// Counts before rounding, up to a common factor; empty for a term of the film.
 struct Wish {
-  std::vector<double> cells;     // empty for a term of the film
+  std::vector<double> cells;
   std::vector<double> variance;  // of the same cells, smoothed
-  double film = 0;
 };
 
 Wish wish_of(const TermFigures& term, const PlanGrid& grid) {
@@ -91,10 +90,7 @@ Wish wish_of(const TermFigures& term, const PlanGrid& grid) {
   const double deviation = std::sqrt(term.variance);
   // Of further samples.
   const double price = term.cost > 0 ? std::sqrt(term.cost - term.first) : 0;
-  if (term.cells.empty()) {
-    wish.film = price > 0 ? deviation / price : 0;
-    return wish;
-  }
+  if (term.cells.empty()) return wish;
   if (!(deviation > 0)) {
     // What a pilot has not seen may be there: one sample, whatever the scale.
     wish.variance.assign(grid.size(), 0);
@@ -126,49 +122,89 @@ double possible(const TermFigures& term, double count) {
   return std::clamp(std::round(count), 1.0, double{kMostInPixel});
 }
 
-double film_count(const TermFigures& term, double count) {
-  return std::clamp(count, term.least, double{kMostInPixel});
-}
-
 struct Totals {
   double error = 0, cost = 0;
   double product() const { return error * cost; }
 };
 
-// With all wishes multiplied by `scale`.
-Totals totals_at(const std::vector<TermFigures>& terms, const std::vector<Wish>& wishes,
-                 double scale) {
-  auto [error, cost] = Totals();
+// Counts at one scale: those of terms of the film for the least product there.
+struct ScaledPlan {
+  Totals totals;
+  std::vector<double> film;  // of each term; 0 of the others
+};
+
+// Of the terms of cells, with all wishes multiplied by `scale`.
+Totals totals_of_cells(const std::vector<TermFigures>& terms, const std::vector<Wish>& wishes,
+                       double scale) {
+  Totals totals;
   for (size_t t = 0; t < terms.size(); ++t) {
-    if (wishes[t].cells.empty()) {
-      const double n = film_count(terms[t], scale * wishes[t].film);
-      error += terms[t].variance / n;
-      cost += terms[t].cost * n;
-      continue;
-    }
     const double each = 1.0 / static_cast<double>(wishes[t].cells.size());
     for (size_t i = 0; i < wishes[t].cells.size(); ++i) {
       const double n = possible(terms[t], scale * wishes[t].cells[i]);
-      error += each * wishes[t].variance[i] / n;
-      cost += each * terms[t].cost_of(n);
+      totals.error += each * wishes[t].variance[i] / n;
+      totals.cost += each * terms[t].cost_of(n);
     }
   }
-  return {error, cost};
+  return totals;
+}
+
+// The count of a term of the film with the least product beside `others`, which costs no more than
+// is left of `most`: the fewest if none is that cheap.
+double best_on_film(const TermFigures& term, const Totals& others, double most) {
+  const auto product = [&](double n) {
+    return (others.error + term.variance / n) * (others.cost + term.cost_of(n));
+  };
+  double best = term.least;
+  if (!(term.variance > 0)) return best;
+  for (double n = term.least; n <= kMostInPixel; n *= std::pow(2.0, 0.25)) {
+    if (others.cost + term.cost_of(n) > most) break;
+    if (product(n) < product(best)) best = n;
+  }
+  return best;
+}
+
+ScaledPlan plan_at(const std::vector<TermFigures>& terms, const std::vector<Wish>& wishes,
+                   double scale, double most) {
+  ScaledPlan plan{totals_of_cells(terms, wishes, scale), std::vector<double>(terms.size())};
+  Totals& sum = plan.totals;
+  const auto add = [&](size_t t, double sign) {
+    sum.error += sign * terms[t].variance / plan.film[t];
+    sum.cost += sign * terms[t].cost_of(plan.film[t]);
+  };
+  for (size_t t = 0; t < terms.size(); ++t) {
+    if (!wishes[t].cells.empty()) continue;
+    plan.film[t] = terms[t].least;
+    add(t, 1);
+  }
+  // Each beside the others: after a few rounds none would change.
+  for (int round = 0; round < 3; ++round) {
+    for (size_t t = 0; t < terms.size(); ++t) {
+      if (!wishes[t].cells.empty()) continue;
+      add(t, -1);
+      plan.film[t] = best_on_film(terms[t], sum, most);
+      add(t, 1);
+    }
+  }
+  return plan;
 }
 
 // The largest scale up to `scale` where a sample costs no more than `most`; 0, which leaves every
 // term the fewest samples that it can have, where none is that cheap. Costs grow with the scale.
 double fitting_scale(const std::vector<TermFigures>& terms, const std::vector<Wish>& wishes,
                      double scale, double most) {
-  if (totals_at(terms, wishes, scale).cost <= most) return scale;
+  const auto fits_at = [&](double s) {
+    return plan_at(terms, wishes, s, most).totals.cost <= most;
+  };
+  if (fits_at(scale)) return scale;
   double fits = 0, exceeds = scale;
   for (int i = 0; i < 20; ++i) {
     const double middle = (fits + exceeds) / 2;
-    (totals_at(terms, wishes, middle).cost <= most ? fits : exceeds) = middle;
+    (fits_at(middle) ? fits : exceeds) = middle;
   }
   return fits;
 }
 
+// 0 where no term of cells varies.
 double best_scale(const std::vector<TermFigures>& terms, const std::vector<Wish>& wishes) {
   double largest = 0;
   for (const Wish& wish : wishes) {
@@ -178,7 +214,7 @@ double best_scale(const std::vector<TermFigures>& terms, const std::vector<Wish>
   std::vector<double> scales, products;
   for (double most = 0.5; most <= kMostInPixel; most *= std::sqrt(2.0)) {
     scales.push_back(most / largest);
-    products.push_back(totals_at(terms, wishes, scales.back()).product());
+    products.push_back(plan_at(terms, wishes, scales.back(), kNoLimit).totals.product());
   }
   const double least = *std::min_element(products.begin(), products.end());
   for (size_t i = 0; i < scales.size(); ++i) {
@@ -193,15 +229,16 @@ double spread_samples(const std::vector<TermFigures>& figures, const PlanGrid& g
                       SamplePlan& plan, double most) {
   std::vector<Wish> wishes;
   for (const TermFigures& term : figures) wishes.push_back(wish_of(term, grid));
-  const double best = best_scale(figures, wishes);
-  if (!(best > 0)) return 0;
-  const double scale = fitting_scale(figures, wishes, best, most);
+  const auto varies = [](const TermFigures& term) { return term.variance > 0 && term.cost > 0; };
+  if (std::none_of(figures.begin(), figures.end(), varies)) return 0;
+  const double scale = fitting_scale(figures, wishes, best_scale(figures, wishes), most);
+  const ScaledPlan scaled = plan_at(figures, wishes, scale, most);
   plan.grid = grid;
   plan.counts.assign(grid.size(), {});
   std::vector<double> means;
   for (size_t t = 0; t < figures.size(); ++t) {
     if (wishes[t].cells.empty()) {
-      means.push_back(film_count(figures[t], scale * wishes[t].film));
+      means.push_back(scaled.film[t]);
       continue;
     }
     double sum = 0;
@@ -212,8 +249,7 @@ double spread_samples(const std::vector<TermFigures>& figures, const PlanGrid& g
     means.push_back(sum / static_cast<double>(grid.size()));
   }
   plan.uniform = SampleCounts(means);
-  const auto [error, cost] = totals_at(figures, wishes, scale);
-  return error / cost;
+  return scaled.totals.error / scaled.totals.cost;
 }
 
 double price_of(const std::vector<TermFigures>& figures, const SampleCounts& counts) {
@@ -289,6 +325,17 @@ int pilot_samples_in_time(int spp, double each, double seconds, double left) {
   const int fitting = static_cast<int>(std::min(seconds / 8 / each, 1e6));
   if ((kLeastPilot - 1) * each > kMost * left) return 0;
   return std::min(spp, std::max(fitting, kLeastPilot)) / 2 * 2;
+}
+
+PilotSize pilot_size(double each, size_t pixels, int spp, double seconds, double left) {
+  constexpr size_t kFewest = 64;  // pixels that tell terms apart; not tuned
+  constexpr double kMost = 0.3;   // as above
+  const double fitting = std::min(seconds / (each * static_cast<double>(pixels)), 1e6);
+  if (fitting >= kLeastPilot) return {pixels, std::min(spp, static_cast<int>(fitting) / 2 * 2)};
+  const auto some = static_cast<size_t>(std::max(seconds, 0.0) / (kLeastPilot * each));
+  const size_t chosen = std::clamp(some, std::min(kFewest, pixels), pixels);
+  if (kLeastPilot * each * static_cast<double>(chosen) > kMost * left) return {0, 0};
+  return {chosen, kLeastPilot};
 }
 
 int film_pilot_samples(int spp) { return spp < 32 ? 0 : std::clamp(spp / 16, 8, 32) / 8 * 8; }

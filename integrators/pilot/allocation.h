@@ -77,6 +77,15 @@ int pilot_samples(int spp);
 // what an eighth of the job holds, or at least four, if these take no more than 0.3 of what is
 // left; 0 otherwise.
 int pilot_samples_in_time(int spp, double each, double seconds, double left);
+// How many pixels a pilot looks at, with how many samples each.
+struct PilotSize {
+  size_t pixels;
+  int spp;
+};
+// At most `pixels` and `spp`, in about so many seconds, where a sample of a pixel takes `each`: a
+// share of the pixels where four samples of all do not fit. At least four samples of a few; no
+// pixels if `left` seconds are too few for that.
+PilotSize pilot_size(double each, size_t pixels, int spp, double seconds, double left);
 // The same of the pilot that finds how positions on the film move, of every other pixel.
 int film_pilot_samples(int spp);
 

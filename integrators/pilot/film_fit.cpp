@@ -437,21 +437,49 @@ double film_speed(const TermEstimator& estimator) {
   return pixels * estimator.motion_rates().in_view(eye, std::isfinite(distance) ? distance : 0);
 }
 
+double edges_per_pixel(const TermEstimator& estimator) {
+  const EdgeSamplerInput* edges = estimator.edges();
+  if (!edges) return 0;
+  const Camera& camera = estimator.scene().camera;
+  const Film& film = estimator.scene().film;
+  const bool moves_camera = estimator.motion_rates().moves_camera();
+  std::vector<bool> met(film_size(film) / 3);
+  size_t count = 0;
+  for (const EdgeMesh& mesh : edges->objects) {
+    if (mesh.tangents.empty() && !moves_camera) continue;
+    for (const Edge& edge : mesh.edges) {
+      const Vec3d middle =
+          0.5 * (mesh.position(edge.vertices[0]) + mesh.position(edge.vertices[1]));
+      const double depth = camera.depth(middle);
+      if (!(depth > camera.near_clip && depth < camera.far_clip)) continue;
+      const auto at = camera.project(middle);
+      const double x = std::floor(at.x) - film.crop_x, y = std::floor(at.y) - film.crop_y;
+      if (!(x >= 0 && y >= 0 && x < film.crop_width && y < film.crop_height)) continue;
+      met[static_cast<size_t>(y) * film.crop_width + static_cast<size_t>(x)] = true;
+      ++count;
+    }
+  }
+  const auto pixels = std::count(met.begin(), met.end(), true);
+  return pixels > 0 ? static_cast<double>(count) / static_cast<double>(pixels) : 0;
+}
+
 // In runs of 2.8 s, 64 x 64 pixels, four samples took a tenth of the time. With the look squared
 // error was 0.8 times as large where the camera moves, which slides all that is seen, 0.95 (sun),
 // 1.05 (demo), 1.25 (concave, object in view) and 1.2 to 1.6 (plant, lights, CAD part). Where they
 // took less than a fourteenth, the look cost a sixth of the time: 0.8 (sun, lights), 0.9 (camera),
 // 1.0 to 1.3 (mirrors, concave, soft shadow, demo), 1.4 to 1.7 (object in view, plant, CAD part).
-bool is_time_for_film(const PilotTime& pilot, bool moves_camera) {
+// Where several edges lie in a pixel, it may be a factor of ten and more, and a pilot of a share of
+// the pixels finds it.
+bool is_time_for_film(const PilotTime& pilot, bool moves_camera, double detail) {
   constexpr double kShare = 1.0 / 28, kCameraShare = 1.0 / 6;  // of the time
   return 4 * pilot.taken < kShare * pilot.seconds * pilot.spp ||
-         (moves_camera && pilot.taken < kCameraShare * pilot.seconds);
+         ((moves_camera || detail >= kFilmDetail) && pilot.taken < kCameraShare * pilot.seconds);
 }
 
 FilmFit fit_film(TermEstimator& estimator, const SamplePlan& plan, const FilmLook& look,
                  const RunSettings& settings, const Stopwatch& watch) {
   FilmFit fit;
-  fit.grid = PlanGrid(estimator.scene().film, kMostProbes);
+  fit.grid = PlanGrid(estimator.scene().film, look.pixels);
   const int parameters = estimator.lanes();
   const double unit = film_speed(estimator);
   if (!(unit > 0) || !std::isfinite(unit)) return fit;
@@ -469,7 +497,7 @@ FilmFit fit_film(TermEstimator& estimator, const SamplePlan& plan, const FilmLoo
     if (pilot.samples() == 1) {
       double most = std::min<double>(look.spp, look.work / pilot.work());
       if (settings.seconds > 0)
-        most = std::min(most, settings.seconds / 8 / (watch.seconds() - began));
+        most = std::min(most, settings.seconds / 16 / (watch.seconds() - began));
       last = whole_turns(most);
     }
     if (!looks_after(pilot.samples(), last)) continue;

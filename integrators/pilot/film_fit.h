@@ -7,6 +7,7 @@
 // takes out most of what slides and is covered there, shadows and mirror images as well.
 #include <vector>
 
+#include "integrators/pilot/pilot.h"
 #include "integrators/pilot/probing_estimator.h"
 #include "integrators/pilot/sample_plan.h"
 
@@ -26,6 +27,7 @@ struct FilmLook {
   // Positions are held where motion leaves more than this share of squared error times work, while
   // directions are held.
   double most_left;
+  size_t pixels = kMostProbes;  // that are probed, as by the other pilot
 };
 
 // What a pilot took of a limit of time.
@@ -34,11 +36,17 @@ struct PilotTime {
   double taken, seconds;
 };
 
-// Whether looking for motion pays: it takes two pilots more.
-bool is_time_for_film(const PilotTime& pilot, bool moves_camera);
+// From so many edges in a pixel on, their motion is looked for by pilots of a share of the pixels.
+// Not tuned.
+inline constexpr double kFilmDetail = 2;
+// Edges that move on the film, hidden ones too, for each pixel that any of them lies in.
+double edges_per_pixel(const TermEstimator& estimator);
+
+// Whether looking for motion pays: it takes two pilots more. detail: edges_per_pixel.
+bool is_time_for_film(const PilotTime& pilot, bool moves_camera, double detail);
 
 // By a pilot. The estimator has kMostFilmParameters at most, and is left with a plan that is of no
-// use. settings, watch: as of run_pilot; it takes an eighth of a limit of time. Deterministic on
+// use. settings, watch: as of run_pilot; it takes a 16th of a limit of time. Deterministic on
 // any number of threads.
 FilmFit fit_film(TermEstimator& estimator, const SamplePlan& plan, const FilmLook& look,
                  const RunSettings& settings, const Stopwatch& watch);

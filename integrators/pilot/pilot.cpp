@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <numeric>
 
-#include "integrators/pilot/allocation.h"
 #include "integrators/pilot/probing_estimator.h"
 
 namespace limn {
@@ -13,8 +12,8 @@ namespace {
 // The samples of probed pixels go into sums; only what belongs to the film goes on.
 class PilotEstimator final : public ProbingEstimator {
  public:
-  PilotEstimator(const TermEstimator& terms, bool turns)
-      : ProbingEstimator(terms), grid_(terms.scene().film, kMostProbes), turns_(turns) {
+  PilotEstimator(const TermEstimator& terms, bool turns, size_t pixels)
+      : ProbingEstimator(terms), grid_(terms.scene().film, pixels), turns_(turns) {
     for (size_t slot = 0; slot < terms.slots(); ++slot) {
       sums_.emplace_back(terms.adds_to_pixels(slot) ? grid_.size() : 0, terms.lanes());
     }
@@ -26,6 +25,11 @@ class PilotEstimator final : public ProbingEstimator {
   void add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const override {
     for (const KeyedSample& sample : samples) add_pixel(sample.at, sample.key, sink);
   }
+  // The film has samples for as many pixels as are probed.
+  double share() const {
+    return static_cast<double>(grid_.size()) / (static_cast<double>(film_size(scene().film)) / 3);
+  }
+  double film_samples(size_t slot) const override { return terms_.film_samples(slot) * share(); }
 
   const PlanGrid& grid() const { return grid_; }
   uint64_t later_lights() const {
@@ -94,8 +98,7 @@ class PilotRun {
   void add_work(int spp, size_t probes, double seconds, PilotFigures& figures) const {
     double all = 0;
     for (size_t slot = 0; slot < costs_.size(); ++slot) {
-      const size_t pixels = terms_.adds_to_pixels(slot) ? probes : film_size(film()) / 3;
-      const double samples = static_cast<double>(spp) * pixels;
+      const double samples = static_cast<double>(spp) * static_cast<double>(probes);
       const double work = terms_.work(slot, costs_[slot]);
       figures.work.push_back(work / samples);
       figures.first_work.push_back(terms_.first_work(slot, costs_[slot]) / samples);
@@ -105,8 +108,8 @@ class PilotRun {
   }
 
   // A thousandth of the pixels, those with the largest variance, is left out: single bright samples
-  // would rule the choice.
-  Lanes film_variance(size_t slot) const {
+  // would rule the choice. share: of a sample that each pixel had.
+  Lanes film_variance(size_t slot, double share) const {
     Lanes result;
     for (int lane = 0; lane < terms_.lanes(); ++lane) {
       const Moments& moments = film_[slot * terms_.lanes() + lane];
@@ -117,6 +120,7 @@ class PilotRun {
       std::sort(variances.begin(), variances.end());
       const size_t kept = variances.size() - variances.size() / 1000;
       for (size_t i = 0; i < kept; ++i) result[lane] += variances[i] / static_cast<double>(kept);
+      result[lane] *= share;
     }
     return result;
   }
@@ -168,10 +172,22 @@ void PilotFigures::merge(const PilotFigures& more) {
   spp = sum;
 }
 
+double seconds_of_pixel(const TermEstimator& estimator, bool turns, const RunSettings& settings,
+                        const Stopwatch& watch) {
+  constexpr size_t kPixels = 256;      // not tuned
+  constexpr int kSample = 0x10000000;  // no other pilot takes it
+  auto owned = std::make_unique<PilotEstimator>(estimator, turns, kPixels);
+  const auto pixels = static_cast<double>(owned->grid().size());
+  PilotRun run(estimator, std::move(owned));
+  const double began = watch.seconds();
+  run.run(settings, kSample, kSample + 1, watch);
+  return (watch.seconds() - began) / pixels;
+}
+
 PilotFigures run_pilot(const TermEstimator& estimator, bool turns, PilotSamples samples,
                        const RunSettings& settings, const Stopwatch& watch) {
   PilotFigures figures;
-  auto owned = std::make_unique<PilotEstimator>(estimator, turns);
+  auto owned = std::make_unique<PilotEstimator>(estimator, turns, samples.pixels);
   PilotEstimator& pilot = *owned;
   PilotRun run(estimator, std::move(owned));
   const double began = watch.seconds();
@@ -192,13 +208,14 @@ PilotFigures run_pilot(const TermEstimator& estimator, bool turns, PilotSamples 
   figures.halves[1] = pilot.take_covariances(half);
   figures.spp = spp;
   figures.grid = pilot.grid();
+  const double share = pilot.share();
   figures.traced = pilot.traced();
   run.add_work(spp, figures.grid.size(), watch.seconds() - began, figures);
   figures.light_work = static_cast<double>(pilot.later_lights()) /
                        (kPilotLights * static_cast<double>(spp) * figures.grid.size());
   for (size_t slot = 0; slot < estimator.slots(); ++slot) {
-    figures.film_variance.push_back(estimator.film_samples(slot) > 0 ? run.film_variance(slot)
-                                                                     : Lanes{});
+    figures.film_variance.push_back(
+        estimator.film_samples(slot) > 0 ? run.film_variance(slot, share) : Lanes{});
   }
   return figures;
 }

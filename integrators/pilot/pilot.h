@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "integrators/estimates/batches.h"
+#include "integrators/pilot/allocation.h"
 #include "integrators/pilot/pilot_moments.h"
 #include "integrators/pilot/sample_plan.h"
 #include "integrators/pilot/term_estimator.h"
@@ -41,11 +42,17 @@ struct PilotFigures {
   void merge(const PilotFigures& more);
 };
 
-// Of the samples of a probed pixel: an even number.
+// Of the samples of a probed pixel: an even number. pixels: so many are probed, about.
 struct PilotSamples {
   int first, last;
+  size_t pixels = kMostProbes;
   int count() const { return last - first; }
 };
+
+// What a pilot's sample of a pixel takes [s], by one sample of a few. settings, watch: as of
+// run_pilot.
+double seconds_of_pixel(const TermEstimator& estimator, bool turns, const RunSettings& settings,
+                        const Stopwatch& watch);
 
 // turns: whether turns of directions at first vertices are looked at. settings: its limit of time
 // is what all pilots and the samples behind them share, which `watch` has timed since they began; a

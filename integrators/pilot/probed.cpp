@@ -40,18 +40,19 @@ double Probed::error_times_work(int parameters, bool turned) const {
   return product;
 }
 
-Probed probe(const TermEstimator& estimator, bool turns, int spp, const RunSettings& settings,
-             const Stopwatch& watch) {
-  Probed probed{run_pilot(estimator, turns, {0, spp}, settings, watch), {}};
+Probed probe(const TermEstimator& estimator, bool turns, const PilotSize& size,
+             const RunSettings& settings, const Stopwatch& watch) {
+  Probed probed{run_pilot(estimator, turns, {0, size.spp, size.pixels}, settings, watch), {}};
   if (turns && probed.pilot.spp > 0)
     probed.fit = fit_fields(probed.pilot, estimator.lanes(), settings.threads);
   return probed;
 }
 
-void extend(Probed& probed, const TermEstimator& estimator, bool turns, int spp,
+void extend(Probed& probed, const TermEstimator& estimator, bool turns, const PilotSize& size,
             const RunSettings& settings, const Stopwatch& watch) {
-  if (spp - probed.pilot.spp < 4) return;
-  const PilotFigures more = run_pilot(estimator, turns, {probed.pilot.spp, spp}, settings, watch);
+  if (size.spp - probed.pilot.spp < 4) return;
+  const PilotFigures more =
+      run_pilot(estimator, turns, {probed.pilot.spp, size.spp, size.pixels}, settings, watch);
   if (more.spp == 0) return;
   probed.pilot.merge(more);
   if (turns) probed.fit = fit_fields(probed.pilot, estimator.lanes(), settings.threads);

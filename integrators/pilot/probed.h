@@ -21,10 +21,11 @@ struct Probed {
 };
 
 // Arguments: as of run_pilot. The estimator has the plan that is looked at.
-Probed probe(const TermEstimator& estimator, bool turns, int spp, const RunSettings& settings,
-             const Stopwatch& watch);
-// The same with the samples from those that it has up to `spp`; as it was where time is short.
-void extend(Probed& probed, const TermEstimator& estimator, bool turns, int spp,
+Probed probe(const TermEstimator& estimator, bool turns, const PilotSize& size,
+             const RunSettings& settings, const Stopwatch& watch);
+// The same with the samples from those that it has up to size.spp, of the same pixels; as it was
+// where time is short.
+void extend(Probed& probed, const TermEstimator& estimator, bool turns, const PilotSize& size,
             const RunSettings& settings, const Stopwatch& watch);
 
 }  // namespace limn

@@ -9,6 +9,7 @@
 #include "integrators/paths/camera_path.h"
 #include "integrators/paths/path_follow.h"
 #include "integrators/paths/path_log.h"
+#include "limn/core/moved.h"
 
 namespace limn {
 namespace {
@@ -49,6 +50,12 @@ DirectionField turning_about_axes(const Lanes& steps, int lanes) {
   return field;
 }
 
+bool draws_edges(const std::vector<const TermType*>& types, const std::vector<bool>& sampled) {
+  for (size_t t = 0; t < types.size(); ++t)
+    if (sampled[t] && types[t]->edges) return true;
+  return false;
+}
+
 }  // namespace
 
 TermEstimator::TermEstimator(const Scene& scene, std::span<const Parameter> parameters,
@@ -56,11 +63,14 @@ TermEstimator::TermEstimator(const Scene& scene, std::span<const Parameter> para
                              const std::vector<bool>& computed, const EdgeSamplerType& sampler,
                              int threads, std::shared_ptr<const FilmRegions> visible,
                              const Warping* warping, bool closed, bool moved_film)
-    : scene_(seeded(scene, parameters)),
+    : changed_(changed_terms(types, computed, moved_in(scene, parameters))),
+      scene_(seeded(scene, parameters)),
       lanes_(static_cast<int>(parameters.size())),
       lane_scale_(natural_steps(parameters)),
       traced_(scene_, threads,
-              {.closed = closed, .edges = true, .faces = visible ? visible->faces() : nullptr}),
+              {.closed = closed,
+               .edges = draws_edges(types, changed_) || warping,
+               .faces = visible ? visible->faces() : nullptr}),
       camera_(scene_.camera),
       filter_(scene_.film.filter),
       visible_(std::move(visible)),
@@ -72,12 +82,12 @@ TermEstimator::TermEstimator(const Scene& scene, std::span<const Parameter> para
   input_.visible = visible_.get();
   for (size_t slot = 0; slot < types_.size(); ++slot) {
     if (types_[slot]->traces_paths) pixel_slot_ = slot;
-    terms_.push_back(computed[slot] ? types_[slot]->make(input_) : nullptr);
+    terms_.push_back(changed_[slot] ? types_[slot]->make(input_) : nullptr);
     if (!terms_[slot]) continue;
     paths_ = paths_ || terms_[slot]->uses_paths();
     vertices_ = vertices_ || terms_[slot]->uses_vertices();
   }
-  if (warping) {
+  if (warping && moved_in(scene, parameters).any()) {
     warp_field_ = std::make_unique<WarpField>(scene_, traced_.context().tracer, input_.edges(),
                                               warping->options, warping->unbiased);
   }

@@ -28,7 +28,8 @@ struct Warping {
 class TermEstimator final : public SampleEstimator {
  public:
   // parameters: at most kLanes. types: terms_of() the scene; slots are indices into it. computed:
-  // one per type. visible: of the film, or null. warping: null where directions are not warped.
+  // one per type; of these only changed_terms() have samples. visible: of the film, or null.
+  // warping: null where directions are not warped.
   // closed: what surfaces scatter is known in closed form, see closed_light.h.
   TermEstimator(const Scene& scene, std::span<const Parameter> parameters,
                 const std::vector<const TermType*>& types, const std::vector<bool>& computed,
@@ -48,7 +49,8 @@ class TermEstimator final : public SampleEstimator {
   void describe(GradientStats& stats) const;
   const EdgeSamplerInput* edges() const { return input_.made_edges(); }
   const PathContext& context() const { return traced_.context(); }
-  const Viewpoints& viewpoints() const { return *traced_.context().viewpoints; }
+  // Null where no edges are sampled.
+  const Viewpoints* viewpoints() const { return traced_.context().viewpoints; }
   const MotionRates& motion_rates() const { return rates_; }
   // Whether a slot's samples belong to pixels, not to the film.
   bool adds_to_pixels(size_t slot) const {
@@ -132,7 +134,8 @@ class TermEstimator final : public SampleEstimator {
   void add_path(const PixelSample& at, const Path& path, double weight, SampleSink& sink) const;
   void add_vertices(const PixelSample& at, const VertexTerms& vertices, SampleSink& sink) const;
 
-  Scene scene_;  // with its parameters seeded
+  std::vector<bool> changed_;  // of each slot: whether it is sampled
+  Scene scene_;                // with its parameters seeded
   int lanes_;
   Lanes lane_scale_;
   TracedScene traced_;

@@ -51,7 +51,11 @@ void DirectTerm::add_at_vertex(const PathVertex& vertex, int samples, BoundarySi
   const EdgeQuery turning = query_at(vertex);
   EdgeQuery held = turning;
   held.turn = {};
-  direct_.list(held, turning, pieces);
+  const double u =
+      regions_.chooses()
+          ? vertex.key.at(Purpose::kDirect, vertex.bounces).at(Purpose::kDirect, 0).uniform()
+          : 0;
+  direct_.list(held, turning, u, pieces);
   if (sink.log()) {
     sink.log()->push_back(fmt::format("  direct: {} pieces of silhouettes before {} regions",
                                       pieces.others.size() + pieces.outlines.size(),

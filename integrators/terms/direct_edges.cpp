@@ -16,7 +16,7 @@ constexpr int kMostSides = 8;
 
 DirectPoint point_at(const DirectPieces::Piece& piece, double u, double times) {
   const auto [t, density] = piece.piece.place(u);
-  return {piece.region, {piece.piece.edge, t, density, times}};
+  return {piece.region, {piece.piece.edge, t, density, times * piece.density}};
 }
 
 }  // namespace
@@ -45,16 +45,19 @@ void draw_pieces(const EdgeSamplerInput& edges, const std::vector<DirectPieces::
   }
 }
 
-void DirectEdges::list(const EdgeQuery& emitters, const EdgeQuery& patches,
+void DirectEdges::list(const EdgeQuery& emitters, const EdgeQuery& patches, double u,
                        DirectPieces& to) const {
+  static thread_local std::vector<LightRegions::Choice> choices;
   static thread_local std::vector<ListedEdge> listed;
   static thread_local std::vector<EdgePiece> pieces;
-  const auto append = [](std::vector<DirectPieces::Piece>& list, uint32_t k, const EdgePiece& piece,
-                         double light) {
-    list.push_back({k, piece, (list.empty() ? 0 : list.back().sum) + piece.weight * light});
+  const auto append = [&](std::vector<DirectPieces::Piece>& list, uint32_t k,
+                          const EdgePiece& piece, double density) {
+    const double before = list.empty() ? 0 : list.back().sum;
+    list.push_back({k, piece, before + piece.weight * regions_.luminance(k) / density, density});
   };
   to.clear();
-  for (uint32_t k = 0; k < regions_.size(); ++k) {
+  regions_.choose(emitters.p, u, choices);
+  for (const auto& [k, expected, times] : choices) {
     const EdgeQuery& query = regions_.shape(k).valid() ? emitters : patches;
     const std::optional<DirectionCone> cone = regions_.cone(k, query.p, query.n);
     if (!cone) continue;
@@ -66,7 +69,7 @@ void DirectEdges::list(const EdgeQuery& emitters, const EdgeQuery& patches,
                        regions_.hull(k).radius < kSmall * length(regions_.hull(k).center - query.p);
     for (const EdgePiece& piece : pieces) {
       const bool own = small && is_own_edge(k, piece.edge);
-      append(own ? to.outlines : to.others, k, piece, regions_.luminance(k));
+      append(own ? to.outlines : to.others, k, piece, expected / times);
     }
   }
 }
@@ -105,7 +108,8 @@ void DirectEdges::draw_outline(const DirectPieces::Piece* begin, const DirectPie
     return;
   }
   cost.samples += kMostSides;
-  const double first = begin->sum - begin->piece.weight * regions_.luminance(begin->region);
+  const double first =
+      begin->sum - begin->piece.weight * regions_.luminance(begin->region) / begin->density;
   const double total = (end - 1)->sum - first;
   const DirectPieces::Piece* piece = begin;
   for (int j = 0; j < kMostSides; ++j) {

@@ -16,7 +16,8 @@ struct DirectPieces {
   struct Piece {
     uint32_t region;
     EdgePiece piece;
-    double sum;  // of the weights up to here
+    double sum;          // of the weights up to here
+    double density = 1;  // how often it is listed on average, over how often it was
   };
   std::vector<Piece> others;
   std::vector<Piece> outlines;  // sides of small emitters, one emitter after the other
@@ -43,8 +44,9 @@ class DirectEdges {
       : edges_(edges), sampler_(sampler), regions_(regions) {}
 
   // Replaces what is in `pieces`. Both queries are of the same point: directions towards emitters
-  // are held, those towards patches may turn.
-  void list(const EdgeQuery& emitters, const EdgeQuery& patches, DirectPieces& pieces) const;
+  // are held, those towards patches may turn. u: in [0, 1), chooses among many emitters.
+  void list(const EdgeQuery& emitters, const EdgeQuery& patches, double u,
+            DirectPieces& pieces) const;
   // Replaces what is in `points`. key: of the path; books samples on `cost`.
   void draw(const DirectPieces& pieces, const Rng& key, int bounces, int samples, TermCost& cost,
             std::vector<DirectPoint>& points) const;

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "integrators/edges/scene_edges.h"
+#include "integrators/paths/chain_light.h"
 #include "integrators/terms/term_table.h"
 
 namespace limn {
@@ -34,6 +35,19 @@ std::vector<const TermType*> terms_of(const Scene& scene, const EdgeSamplerType&
     if (applies) types.push_back(&type);
   }
   return types;
+}
+
+Moved moved_in(const Scene& scene, std::span<const Parameter> parameters) {
+  Moved moved = moved_by(parameters);
+  moved.rays = !moved.vertices && find_smooth(scene) && moves_what_is_seen(scene, parameters);
+  return moved;
+}
+
+std::vector<bool> changed_terms(std::span<const TermType* const> types,
+                                const std::vector<bool>& computed, const Moved& moved) {
+  std::vector<bool> changed(types.size());
+  for (size_t t = 0; t < types.size(); ++t) changed[t] = computed[t] && types[t]->changes(moved);
+  return changed;
 }
 
 const EdgeSamplerInput& TermInput::edges() {

@@ -106,6 +106,8 @@ class Term {
 
 class FilmRegions;
 struct FreeMotion;
+struct Moved;
+struct Parameter;
 
 // What the terms of a pass are made from. It outlives them.
 class TermInput {
@@ -167,6 +169,7 @@ struct TermType {
   bool moved_with_directions;  // its mean changes where directions move, see direction_field.h
   int film_stream;             // tells the random numbers of terms on the film apart
   bool (*applies)(const Scene& scene);  // whether the scene has anything that the term could be of
+  bool (*changes)(const Moved& moved);  // whether it can differ from zero where this moves
   bool regions;     // it is of samplers that keep regions of light apart, and of no others
   bool moved_film;  // it is of methods that move positions on the film, and of no others
   std::unique_ptr<Term> (*make)(TermInput& input);
@@ -183,6 +186,11 @@ bool has_term(const EdgeSamplerType& sampler, const TermType& type, bool closed,
 // mode, fits and comparisons ask here.
 std::vector<const TermType*> terms_of(const Scene& scene, const EdgeSamplerType& sampler,
                                       bool closed = false, bool moved_film = false);
+// What any of the parameters moves.
+Moved moved_in(const Scene& scene, std::span<const Parameter> parameters);
+// Of those that are computed, the ones that can differ from zero, by index.
+std::vector<bool> changed_terms(std::span<const TermType* const> types,
+                                const std::vector<bool>& computed, const Moved& moved);
 // The row that is on the film alone.
 const TermType& film_term();
 // Sums of all terms are kept on the stack.

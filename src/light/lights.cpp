@@ -14,6 +14,8 @@ namespace {
 
 // Probability of a uniform choice: the light with the largest estimate may be occluded.
 constexpr double kAny = 0.25;
+// Of fewer lights all estimates are made. Not tuned.
+constexpr size_t kMany = 32;
 
 }  // namespace
 
@@ -50,6 +52,31 @@ Lights::Lights(const Scene& scene, const Lights* chosen_by)
     Reach& reach = reaches_.emplace_back();
     reach.constant = kPi * std::fabs(environment_->mean_luminance());
   }
+  if (all_.size() > kMany && !chosen_by_) grow_tree();
+}
+
+// Of the lights that have a place.
+void Lights::grow_tree() {
+  std::vector<LightTree::Emitter> emitters;
+  for (size_t k = 0; k < all_.size(); ++k) {
+    const DeltaLight* delta = all_[k]->delta();
+    of_light_.push_back(emitters.size());
+    if (k < area_lights_.size()) {
+      const Reach& reach = reaches_[k];
+      const double luminance = std::fabs(reach.luminance);
+      emitters.push_back({reach.center, reach.facing * luminance, reach.rest * luminance,
+                          reach.spread, luminance * reach.spread * kPi});
+    } else if (delta && !delta->origin().infinite) {
+      const double power = std::fabs(delta->power());
+      emitters.push_back({value(delta->origin().v), {}, power, 0, power});
+    } else {
+      of_light_.back() = kListed;
+      listed_.push_back(k);
+      continue;
+    }
+    in_tree_.push_back(k);
+  }
+  if (emitters.size() > kMany) tree_ = LightTree(emitters);
 }
 
 Lights::Reach Lights::reach_of(const Light& light) {
@@ -95,8 +122,15 @@ S Lights::estimate(const Reach& reach, const Vec3<S>& p) {
 }
 
 Lights::Point Lights::at(const Vec3d& p) const {
+  if (chosen_by_) return chosen_by_->at(p);
   Point place{p};
   if (all_.size() < 2) return place;
+  if (grows()) {
+    place.first[0] = place.sum = tree_.irradiance(p);
+    for (const size_t light : listed_) place.sum += estimate(light, p);
+    if (!std::isfinite(place.sum)) place.sum = 0;
+    return place;
+  }
   for (size_t k = 0; k < all_.size(); ++k) {
     const double of_light = estimate(k, p);
     if (k < place.first.size()) place.first[k] = of_light;
@@ -113,6 +147,10 @@ void Lights::at(std::span<const Vec3d* const> p, std::span<Point* const> places)
   }
   if (all_.size() < 2) {
     for (size_t i = 0; i < p.size(); ++i) *places[i] = Point{*p[i]};
+    return;
+  }
+  if (grows()) {
+    for (size_t i = 0; i < p.size(); ++i) *places[i] = at(*p[i]);
     return;
   }
   wide::for_blocks(p.size(), [&](size_t first, size_t last) {
@@ -140,18 +178,33 @@ void Lights::at(std::span<const Vec3d* const> p, std::span<Point* const> places)
 
 double Lights::probability(const Point& place, size_t light) const {
   if (!(place.sum > 0)) return of_any_;
-  return kAny * of_any_ + (1 - kAny) * estimate(light, place) / place.sum;
+  if (chosen_by_) return chosen_by_->probability(place, light);
+  const bool in_tree = grows() && of_light_[light] != kListed;
+  const double estimated = in_tree ? place.first[0] * tree_.probability(place.p, of_light_[light])
+                                   : estimate(light, place);
+  return kAny * of_any_ + (1 - kAny) * estimated / place.sum;
 }
 
 size_t Lights::choose(const Point& place, double u) const {
   if (all_.size() == 1) return 0;
+  if (chosen_by_) return chosen_by_->choose(place, u);
   const double any = place.sum > 0 ? kAny : 1;
   const size_t last = all_.size() - 1;
   if (u < any) {
     return std::min(static_cast<size_t>(u / any * static_cast<double>(all_.size())), last);
   }
-  size_t light = 0;
   double left = (u - any) / (1 - any) * place.sum;
+  if (grows()) {
+    if (left < place.first[0] || listed_.empty()) {
+      const double u_in_tree = std::min(left / place.first[0], 1 - 0x1p-53);
+      return in_tree_[tree_.choose(place.p, u_in_tree)];
+    }
+    left -= place.first[0];
+    size_t i = 0;
+    while (i + 1 < listed_.size() && (left -= estimate(listed_[i], place)) >= 0) ++i;
+    return listed_[i];
+  }
+  size_t light = 0;
   while (light < last && (left -= estimate(light, place)) >= 0) ++light;
   return light;
 }

@@ -96,6 +96,36 @@ FloatBox box_of(const Mesh& mesh) {
                     largest_coordinate(std::array{bounds.lower, bounds.upper}), 0);
 }
 
+// The boxes of a scene's shapes.
+class ShapeBoxes {
+ public:
+  ShapeBoxes(const Scene& scene, int threads) : boxes_(all(scene)), tree_(boxes_, threads) {}
+
+  // Replaces `others` by those that overlap the box of `shape`, but for its own.
+  void find_others(ShapeId shape, std::vector<FloatBox>& others) const {
+    const FloatBox& own = boxes_[shape.index()];
+    others.clear();
+    std::vector<uint32_t> leaves;
+    tree_.find_leaves(own, 0, leaves);
+    for (const uint32_t leaf : leaves) {
+      for (uint32_t bits = tree_.boxes(leaf).overlaps(own); bits != 0; bits &= bits - 1) {
+        const uint32_t other = tree_.leaf(leaf)[static_cast<size_t>(std::countr_zero(bits))];
+        if (other != shape.index()) others.push_back(boxes_[other]);
+      }
+    }
+  }
+
+ private:
+  static std::vector<FloatBox> all(const Scene& scene) {
+    std::vector<FloatBox> boxes;
+    for (const Shape& shape : scene.shapes) boxes.push_back(box_of(shape.mesh));
+    return boxes;
+  }
+
+  std::vector<FloatBox> boxes_;
+  BoxTree tree_;
+};
+
 struct FoundPair {
   FacePair faces;
   bool near = false;  // near, not coplanar
@@ -103,27 +133,30 @@ struct FoundPair {
 
 class OverlapFinder {
  public:
-  OverlapFinder(const Scene& scene, const DuplicateFaces& copies, FaceOverlaps::Of of) {
-    if (of == FaceOverlaps::Of::kAllFaces) reserve(scene);
-    std::vector<FloatBox> shapes;
-    for (const Shape& shape : scene.shapes) shapes.push_back(box_of(shape.mesh));
+  OverlapFinder(const Scene& scene, const DuplicateFaces& copies, FaceOverlaps::Of of,
+                int threads) {
+    const bool all = of == FaceOverlaps::Of::kAllFaces;
+    std::optional<ShapeBoxes> shapes;
+    if (all) {
+      reserve(scene);
+    } else {
+      shapes.emplace(scene, threads);
+    }
+    std::vector<FloatBox> others;
     for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
-      std::vector<FloatBox> others;
-      for (uint32_t i = 0; i < shapes.size(); ++i)
-        if (i != s && shapes[i].overlaps(shapes[s])) others.push_back(shapes[i]);
-      if (of == FaceOverlaps::Of::kDifferentShapes && others.empty()) continue;
+      if (!all) {
+        shapes->find_others(ShapeId(s), others);
+        if (others.empty()) continue;
+      }
       const Mesh& mesh = scene.shapes[s].mesh;
       for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
         const FaceRef face{ShapeId(s), FaceId(f)};
         const Corners corners = corners_of(scene, face);
-        const double blur =
-            of == FaceOverlaps::Of::kAllFaces ? blur_of(corners, value(scene.camera.origin)) : 0;
+        const double blur = all ? blur_of(corners, value(scene.camera.origin)) : 0;
         const double most = kMostNear * longest_side(corners);
         const FloatBox box = box_of(corners, std::min(blur, most));
         const auto meets = [&](const FloatBox& other) { return other.overlaps(box); };
-        if (of == FaceOverlaps::Of::kDifferentShapes &&
-            std::none_of(others.begin(), others.end(), meets))
-          continue;
+        if (!all && std::none_of(others.begin(), others.end(), meets)) continue;
         if (copies.first(face) != face || !has_area(mesh, mesh.faces[f])) continue;
         faces_.push_back({face, corners, normalize(normal_of(corners)), blur, most,
                           largest_coordinate(corners)});
@@ -199,7 +232,7 @@ FaceOverlaps::FaceOverlaps(const Scene& scene, const DuplicateFaces& copies, int
     faces += shape.mesh.faces.size();
   }
   has_others_.resize(faces);
-  std::vector<FoundPair> pairs = OverlapFinder(scene, copies, of).find(threads);
+  std::vector<FoundPair> pairs = OverlapFinder(scene, copies, of, threads).find(threads);
   const size_t count = pairs.size();
   pairs.reserve(2 * count);
   for (size_t i = 0; i < count; ++i)

@@ -13,6 +13,7 @@ namespace {
 class CameraTranslation final : public Motion {
  public:
   explicit CameraTranslation(int axis) : axis_(axis) {}
+  Moved moved() const override { return {.camera = true}; }
   void seed(Scene& scene, int lane, size_t) const override {
     scene.camera.origin[axis_].d[lane] += 1;
   }
@@ -36,6 +37,7 @@ class CameraTranslation final : public Motion {
 class CameraRotation final : public Motion {
  public:
   explicit CameraRotation(int axis) : axis_(axis) {}
+  Moved moved() const override { return {.camera = true}; }
   void seed(Scene& scene, int lane, size_t) const override {
     for (Vec3<Dual>* v : frame(scene.camera)) {
       const Vec3d velocity = cross(unit_vector(axis_), value(*v));
@@ -62,6 +64,7 @@ class FieldOfView final : public Motion {
   static constexpr double kLeast = std::numeric_limits<double>::min();
   static double most() { return std::nextafter(180.0, 0.0); }
 
+  Moved moved() const override { return {.camera = true}; }
   void seed(Scene& scene, int lane, size_t) const override { scene.camera.fov.d[lane] += 1; }
   void move(Scene& scene, double step, size_t) const override { scene.camera.fov.v += step; }
   std::vector<double> numbers(const Scene& scene) const override { return {scene.camera.fov.v}; }

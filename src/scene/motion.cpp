@@ -14,6 +14,7 @@ class OneComponent final : public Motion {
   OneComponent(std::shared_ptr<const Motion> array, size_t component)
       : array_(std::move(array)), component_(component) {}
 
+  Moved moved() const override { return array_->moved(); }
   void seed(Scene& scene, int lane, size_t) const override {
     array_->seed(scene, lane, component_);
   }

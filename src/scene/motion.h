@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "limn/core/moved.h"
 #include "limn/core/parameter.h"
 
 namespace limn {
@@ -13,6 +14,7 @@ class Motion {
  public:
   virtual ~Motion() = default;
 
+  virtual Moved moved() const = 0;
   // These functions are documented at Parameter.
   virtual void seed(Scene& scene, int lane, size_t component) const = 0;
   virtual void move(Scene& scene, double step, size_t component) const = 0;

@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "limn/core/check.h"
+#include "limn/core/moved.h"
 #include "limn/core/names.h"
 #include "src/scene/motion.h"
 #include "src/scene/motion_lists.h"
@@ -110,6 +111,12 @@ std::vector<double> Parameter::value(const Scene& scene) const { return motion->
 void Parameter::assign(Scene& scene, const std::vector<double>& value,
                        std::vector<std::string>* warnings) const {
   motion->assign(scene, name, value, warnings);
+}
+
+Moved moved_by(std::span<const Parameter> parameters) {
+  Moved moved;
+  for (const Parameter& parameter : parameters) moved = moved | parameter.motion->moved();
+  return moved;
 }
 
 std::vector<Vec3d> Parameter::velocities(const Scene& scene, ShapeId shape,

@@ -29,6 +29,7 @@ class ShapeMotion : public Motion {
  public:
   explicit ShapeMotion(ShapeId shape) : shape_(shape) {}
 
+  Moved moved() const final { return {.vertices = true}; }
   void seed(Scene& scene, int lane, size_t component) const final {
     Mesh& mesh = scene.shapes[shape_.index()].mesh;
     add_to_lane(mesh.position_tangents, lane, vertex_velocities(mesh, component));

@@ -31,6 +31,7 @@ class TexelMotion : public Motion {
   explicit TexelMotion(Texels texels) : texels_(std::move(texels)) {}
 
   TexelMap* texel_map(Scene& scene) const final { return texels_.find(scene); }
+  Moved moved() const final { return {}; }
   void seed(Scene& scene, int lane, size_t component) const final {
     texel_map(scene)->add_texel_tangents(texel_velocities(scene, component), lane);
   }

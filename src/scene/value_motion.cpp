@@ -1,4 +1,4 @@
-// Parameters of BSDFs and emitters: values to which the step is added.
+// Parameters of BSDFs and emitters: values to which the step is added, and where delta lights are.
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -15,7 +15,9 @@ using Values = std::function<ParameterRef(Scene&)>;
 
 class ValueMotion final : public Motion {
  public:
-  explicit ValueMotion(Values values) : values_(std::move(values)) {}
+  explicit ValueMotion(Values values, const Moved& moved = {})
+      : values_(std::move(values)), moved_(moved) {}
+  Moved moved() const override { return moved_; }
   void seed(Scene& scene, int lane, size_t) const override {
     for (Dual* v : values_(scene).values) v->d[lane] += 1;
   }
@@ -58,15 +60,16 @@ class ValueMotion final : public Motion {
 
  private:
   Values values_;
+  Moved moved_;
 };
 
 // The natural step is a hundredth of the largest value, or 0.01 if all are 0.
 Parameter value_parameter(const std::string& name, const std::vector<double>& now,
-                          const Values& values) {
+                          const Values& values, const Moved& moved = {}) {
   double largest = 0;
   for (const double v : now) largest = std::max(largest, std::fabs(v));
   Parameter parameter{name, "", 0.01 * (largest > 0 ? largest : 1), 1,
-                      std::make_shared<ValueMotion>(values)};
+                      std::make_shared<ValueMotion>(values, moved)};
   parameter.colour = now.size() == 3;
   return parameter;
 }
@@ -79,16 +82,25 @@ void set_unit(ParameterRef::Unit unit, double size, Parameter& parameter) {
   parameter.natural_step = length ? 0.01 * size : 0.01;
 }
 
-// Adds the named values of an object. owner: finds the object in a copy of the scene.
+// Light comes from another place, or from another direction at all points alike.
+Moved moved_by(ParameterRef::Unit unit, const DeltaLight& light) {
+  const bool turns = unit == ParameterRef::Unit::kRadians;
+  return {.delta_lights =
+              unit == ParameterRef::Unit::kLength || (turns && light.origin().infinite)};
+}
+
+// Adds the named values of an object. owner: finds the object in a copy of the scene; light: what
+// it is, if that is a delta light.
 template <class Owner>
 void add_values(const std::string& id, const std::vector<ParameterRef>& values, const Owner& owner,
-                std::vector<Parameter>& list, double size = 0) {
+                std::vector<Parameter>& list, const DeltaLight* light = nullptr, double size = 0) {
   for (size_t k = 0; k < values.size(); ++k) {
     std::vector<double> now;
     for (const Dual* v : values[k].values) now.push_back(v->v);
-    Parameter p = value_parameter(id + "." + values[k].name, now, [owner, k](Scene& scene) {
-      return owner(scene)->parameters()[k];
-    });
+    Parameter p = value_parameter(
+        id + "." + values[k].name, now,
+        [owner, k](Scene& scene) { return owner(scene)->parameters()[k]; },
+        light ? moved_by(values[k].unit, *light) : Moved{});
     set_unit(values[k].unit, size, p);
     p.least = values[k].least;
     p.most = values[k].most;
@@ -127,7 +139,7 @@ void add_emitter_parameters(const Scene& scene, std::vector<Parameter>& list) {
     DeltaLight& light = *scene.delta_lights[i];
     if (light.id.empty()) continue;
     const auto owner = [i](Scene& copy) { return copy.delta_lights[i]; };
-    add_values(light.id, light.parameters(), owner, list, scene_size(scene));
+    add_values(light.id, light.parameters(), owner, list, &light, scene_size(scene));
   }
 }
 

@@ -215,18 +215,19 @@ double share_that_moves(const GradientResult& result) {
   return share;
 }
 
-// Of four samples or eight, alike; longer where the camera moves.
+// Of four samples or eight, alike; longer where the camera or much detail moves.
 TEST(FilmMotion, IsLookedForWhereThereIsTime) {
   for (const int spp : {4, 8}) {
     const double limit = 2.8, each = limit / 112 / 1.01;  // a 28th for four samples
-    EXPECT_TRUE(is_time_for_film({spp, spp * each, limit}, false)) << spp;
-    EXPECT_FALSE(is_time_for_film({spp, spp * each * 1.03, limit}, false)) << spp;
+    EXPECT_TRUE(is_time_for_film({spp, spp * each, limit}, false, 0)) << spp;
+    EXPECT_FALSE(is_time_for_film({spp, spp * each * 1.03, limit}, false, 0)) << spp;
   }
-  EXPECT_TRUE(is_time_for_film({4, 0.46, 2.8}, true));
-  EXPECT_FALSE(is_time_for_film({4, 0.47, 2.8}, true));
-  EXPECT_FALSE(is_time_for_film({4, 0.46, 2.8}, false));
+  EXPECT_TRUE(is_time_for_film({4, 0.46, 2.8}, true, 0));
+  EXPECT_FALSE(is_time_for_film({4, 0.47, 2.8}, true, 0));
+  EXPECT_FALSE(is_time_for_film({4, 0.46, 2.8}, false, 1));
+  EXPECT_TRUE(is_time_for_film({4, 0.46, 2.8}, false, 3));
   // What pays does not depend on the limit's unit.
-  EXPECT_TRUE(is_time_for_film({4, 46, 280}, true));
+  EXPECT_TRUE(is_time_for_film({4, 46, 280}, true, 0));
 }
 
 TEST(FilmMotion, TakesOutDetailThatSlides) {

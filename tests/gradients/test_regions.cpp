@@ -237,6 +237,51 @@ TEST(Regions, AgreeWithDifferences) {
   expect_right(gloss, "body.translate.x", 512);
 }
 
+// Many emitters, of which a vertex chooses some: what moves before them, and one of them, and the
+// camera. `forest` knows nothing of the choice.
+TEST(Regions, ChosenAmongMany) {
+  const TempFiles files;
+  std::string lamps;
+  for (int i = 0; i < 40; ++i) {
+    lamps += square("lamp" + std::to_string(i), 0.12, 90,
+                    {0.5 * (i % 8) - 2, 2.2 + 0.07 * (i % 5), 0.5 * (i / 8) - 1.2},
+                    area_light("glow" + std::to_string(i), std::to_string(2 + i % 9) + ", 5, 3"));
+  }
+  const Scene scene = lit_scene(files, lamps);
+  ASSERT_TRUE(LightRegions(scene).chooses());
+  const std::vector<std::string> parameters = {"body.translate.x", "lamp3.translate.x",
+                                               "sensor.rotate.y"};
+  const GradientResult a = run(scene, "silhouettes", parameters, 128, 1);
+  const GradientResult b = run(scene, "forest", parameters, 512, 2);
+  for (size_t k = 0; k < parameters.size(); ++k) expect_equal(a.parameters[k], b.parameters[k]);
+}
+
+// By brute force over the numbers that choose: each region is there as often as it is expected.
+TEST(Regions, ChoicesHaveTheirExpectations) {
+  const TempFiles files;
+  for (const int count : {12, 40, 300}) {
+    std::string lamps;
+    for (int i = 0; i < count; ++i) {
+      lamps += square("lamp" + std::to_string(i), 0.05, 90,
+                      {0.3 * (i % 17) - 2, 2.2 + 0.07 * (i % 5), 0.3 * (i / 17) - 1.2},
+                      area_light("glow" + std::to_string(i), "5, 5, 3"));
+    }
+    const Scene scene = lit_scene(files, lamps);
+    const LightRegions regions(scene);
+    EXPECT_EQ(regions.chooses(), count > 16);
+    for (const Vec3d& p : {Vec3d{0.2, 0, 0.3}, Vec3d{1.5, 2.1, 1}}) {
+      constexpr int kDraws = 8000;
+      std::vector<double> sums(regions.size());
+      std::vector<LightRegions::Choice> choices;
+      for (int i = 0; i < kDraws; ++i) {
+        regions.choose(p, (i + 0.5) / kDraws, choices);
+        for (const auto& [region, expected, times] : choices) sums[region] += times / expected;
+      }
+      for (const double sum : sums) EXPECT_NEAR(sum / kDraws, 1, 0.05);
+    }
+  }
+}
+
 // Units of length drop out.
 TEST(Regions, DoNotKnowTheUnit) {
   const std::vector<std::string> parameters = {"body.rotate.x"};

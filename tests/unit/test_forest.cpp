@@ -149,6 +149,37 @@ TEST_P(Forests, ListOutlinesInCones) {
   EXPECT_GT(count.wanted, 10000);
 }
 
+// More trees than are all looked at, some of which move.
+TEST_P(Forests, ListOutlinesOfManyObjects) {
+  Rng rng(25, 0, 0);
+  Count count;
+  for (int i = 0; i < 6; ++i) {
+    const double scale = random_scale(rng), shift = i % 2 == 0 ? 0 : 1e4 * rng.uniform();
+    EdgeSamplerInput input;
+    for (uint32_t o = 0; o < 60; ++o) {
+      Vec3d rows[3];
+      random_rotation(rng, rows);
+      const Vec3d at = random_direction(rng) * (3 * scale * rng.uniform());
+      Mesh mesh = transformed(o % 2 == 0 ? cube_mesh() : grid_mesh(3), rows, 0.1 * scale,
+                              at + Vec3d{shift, 0, 0});
+      if (o % 5 == 0) set_test_tangents(mesh);
+      input.objects.push_back(build_edge_mesh(mesh, o % 3 != 0, ShapeId(o)));
+    }
+    const auto forest = EdgeForest::build(input, 1, GetParam());
+    for (int k = 0; k < 120; ++k) {
+      EdgeQuery query;
+      query.p = random_point(input.objects[k % 60], scale, rng);
+      query.n = random_direction(rng);
+      if (k % 3 == 1) query.velocity.x[2] = 1;
+      if (k % 3 == 2) query.turn.rate.y[0] = 1;
+      const Vec3d to = random_point(input.objects[(7 * k) % 60], scale, rng) - query.p;
+      const Vec3d axis = length(to) > 0 ? normalize(to) : random_direction(rng);
+      expect_outlines(input, *forest, query, random_cone(axis, rng), "many", count);
+    }
+  }
+  EXPECT_GT(count.wanted, 1000);
+}
+
 // Sharp edges are outlines only where one side is free.
 TEST(Outlines, OfACube) {
   const EdgeMesh solid = build_edge_mesh(cube_mesh(), true),

@@ -163,6 +163,87 @@ TEST(Lights, MoreThanFourAreDrawnAsOftenAsTheirDensitiesSay) {
   expect_draws_of_densities(scene_with(files, sky + lamps), 6);
 }
 
+// By a tree, among lights that have no place in it.
+TEST(Lights, ManyAreDrawnAsOftenAsTheirDensitiesSay) {
+  const TempFiles files;
+  std::string body = R"(<emitter type="constant"/><emitter type="directional"/>)";
+  for (int i = 0; i < 60; ++i) {
+    const std::string glow = std::to_string(1 + i % 7);
+    body += square("lamp" + std::to_string(i), 0.1 + 0.01 * i, 90,
+                   {i % 8 - 4.0, 2 + 0.1 * (i % 5), i / 8 - 4.0},
+                   area_light("glow" + std::to_string(i), glow + ", 1, 1"));
+  }
+  std::string dots;
+  for (int i = 0; i < 40; ++i) {
+    dots += R"(<emitter type="point"><point name="position" y="2" z="0" x=")" +
+            std::to_string(0.3 * i) + R"("/></emitter>)";
+  }
+  const Scene scene = scene_with(files, body);
+  expect_draws_of_densities(scene, 60);
+  expect_draws_of_densities(scene_with(files, body + dots), 60);
+  // Those of a scene that moves are chosen by the one that does not.
+  const Scene moved = find_parameter(scene, "lamp7.translate.x").moved(scene, 0.5);
+  const Lights lights(scene), there(moved, &lights);
+  for (const Vec3d& p : {Vec3d{0.3, 1, 0.2}, Vec3d{2, 0, -1}}) {
+    Rng a(1, 2, 3), b(1, 2, 3);
+    for (int i = 0; i < 100; ++i) {
+      const auto one = lights.sample(lights.at(p), a), other = there.sample(there.at(p), b);
+      EXPECT_EQ(one->face, other->face);
+    }
+  }
+}
+
+std::vector<LightTree::Emitter> some_emitters(size_t count, bool round, Rng& rng) {
+  std::vector<LightTree::Emitter> emitters(count);
+  for (LightTree::Emitter& e : emitters) {
+    for (int k = 0; k < 3; ++k) e.center[k] = 4 * rng.uniform();
+    e.light = std::exp2(8 * rng.uniform());
+    const double flat = round ? 0 : rng.uniform() < 0.5 ? 1 : rng.uniform();
+    e.facing = normalize(Vec3d{rng.uniform() - 0.5, rng.uniform() - 0.5, rng.uniform() - 0.5}) *
+               (flat * e.light);
+    e.rest = (1 - flat) * e.light / 4;
+    e.spread = 0.01 * rng.uniform();
+  }
+  return emitters;
+}
+
+// What a tree chooses at u is as wide in u as is likely, and follows itself without gaps.
+TEST(LightTree, ChoosesAsOftenAsItsProbabilitiesSay) {
+  Rng rng(7, 8, 9);
+  for (const size_t count : {1, 2, 3, 17, 100, 257}) {
+    const LightTree tree(some_emitters(count, false, rng));
+    for (int i = 0; i < 20; ++i) {
+      const Vec3d p{8 * rng.uniform() - 2, 8 * rng.uniform() - 2, 8 * rng.uniform() - 2};
+      std::vector<double> probabilities;
+      for (size_t e = 0; e < count; ++e) probabilities.push_back(tree.probability(p, e));
+      EXPECT_NEAR(std::accumulate(probabilities.begin(), probabilities.end(), 0.0), 1, 1e-12);
+      constexpr int kDraws = 4000;
+      std::vector<int> drawn(count);
+      for (int j = 0; j < kDraws; ++j) ++drawn[tree.choose(p, (j + 0.5) / kDraws)];
+      for (size_t e = 0; e < count; ++e) {
+        // An interval of u: it holds as many of a row of numbers as fit, one more, or one less.
+        EXPECT_NEAR(drawn[e], kDraws * probabilities[e], 1 + 1e-6);
+      }
+    }
+  }
+}
+
+// Far off, the probabilities are those of the emitters' own estimates, where these shine in all
+// directions.
+TEST(LightTree, ChoosesInProportionToWhatIsSent) {
+  Rng rng(1, 1, 2);
+  const std::vector<LightTree::Emitter> emitters = some_emitters(50, true, rng);
+  const LightTree tree(emitters);
+  const Vec3d p{900, 700, 300};
+  const double all = tree.irradiance(p);
+  for (size_t e = 0; e < emitters.size(); ++e) {
+    const LightTree one(std::span(&emitters[e], 1));
+    EXPECT_NEAR(tree.probability(p, e) * all / one.irradiance(p), 1, 0.01) << e;
+  }
+  EXPECT_TRUE(LightTree().empty());
+  EXPECT_EQ(LightTree().irradiance(p), 0);
+}
+
 // To the bit, lights of every kind among each other; what was in a sample's place is gone.
 TEST(Lights, DrawnAtOnceAreThoseDrawnAlone) {
   const TempFiles files;

@@ -6,12 +6,14 @@
 #include <vector>
 
 #include "limn/core/light.h"
+#include "limn/core/light_tree.h"
 #include "limn/core/scene.h"
 
 namespace limn {
 
 // Chooses one light at a shading point, mostly in proportion to its estimated unoccluded
-// irradiance, sometimes uniformly (lights.cpp). The order is: emitting shapes, the environment,
+// irradiance, sometimes uniformly (lights.cpp). Many lights are chosen by a tree.
+// The order is: emitting shapes, the environment,
 // delta lights as in the file. The scene must outlive it.
 class Lights {
  public:
@@ -31,13 +33,14 @@ class Lights {
   struct Point {
     Vec3d p;
     double sum = 0;
-    std::array<double, 4> first{};  // estimates of the first lights; their number is not tuned
+    // Estimates of the first lights, as many as that (not tuned); with a tree, its own alone.
+    std::array<double, 4> first{};
   };
   Point at(const Vec3d& p) const;
   // `at` for many points, eight at a time (SIMD).
   void at(std::span<const Vec3d* const> p, std::span<Point* const> places) const;
   // Estimated unoccluded irradiance at p from a light (an index into all()), for a surface that
-  // faces it [W / m^2, luminance].
+  // faces it [W / m^2, luminance]. With a tree, lights are not chosen in proportion to it.
   double estimate(size_t light, const Vec3d& p) const;
 
   // One number selects the light, the others sample it.
@@ -84,16 +87,23 @@ class Lights {
   template <class S>
   static S estimate(const Reach& reach, const Vec3<S>& p);
   double estimate(size_t light, const Point& place) const {
-    return light < place.first.size() ? place.first[light] : estimate(light, place.p);
+    return light < place.first.size() && !grows() ? place.first[light] : estimate(light, place.p);
   }
+  void grow_tree();
+  bool grows() const { return !tree_.empty(); }
   size_t choose(const Point& place, double u) const;
   double probability(const Point& place, size_t light) const;
 
   std::vector<std::unique_ptr<Light>> area_lights_;
   std::vector<const Light*> all_;
-  std::vector<Reach> reaches_;      // of all lights but delta lights
-  std::vector<size_t> of_shape_;    // index of a shape's light; unspecified if it does not emit
-  double of_any_ = 1;               // 1 / number of lights
+  std::vector<Reach> reaches_;    // of all lights but delta lights
+  std::vector<size_t> of_shape_;  // index of a shape's light; unspecified if it does not emit
+  double of_any_ = 1;             // 1 / number of lights
+  LightTree tree_;                // of many lights at finite places; else empty
+  std::vector<size_t> in_tree_;   // its lights
+  std::vector<size_t> listed_;    // with a tree, all others
+  static constexpr size_t kListed = SIZE_MAX;
+  std::vector<size_t> of_light_;    // with a tree, the place of each light there, or kListed
   const Environment* environment_;  // null if none
   const Lights* chosen_by_;         // null: this
 };

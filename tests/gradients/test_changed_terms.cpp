@@ -1,0 +1,166 @@
+// Terms that no parameter of a run can change are left out: beside a parameter that has all of
+// them, what each adds for the others is zero to the last bit.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <set>
+
+#include "limn/core/image.h"
+#include "limn/core/parameter.h"
+#include "limn/integrators/backward.h"
+#include "limn/integrators/check.h"
+#include "limn/integrators/gradient.h"
+#include "support/meshes.h"
+#include "support/scenes.h"
+
+namespace limn {
+namespace {
+
+// Shapes, a camera, a BSDF with an alpha and one with a texture, and a light of every kind.
+Scene scene_with_all(const TempFiles& files) {
+  SceneParts parts;
+  parts.width = parts.height = 8;
+  parts.body =
+      ball_over_gloss(files, 0.3) +
+      square("wall", 1.5, 0, {0, 1, -1.5},
+             R"(<bsdf type="diffuse" id="paint"><texture type="checkerboard" name="reflectance"/>
+                </bsdf>)") +
+      R"(<emitter type="point" id="dot"><point name="position" value="1,3,1"/></emitter>
+         <emitter type="spot" id="beam"><transform name="to_world">
+         <lookat origin="-1,4,1" target="0,0,0" up="1,0,0"/></transform></emitter>
+         <emitter type="directional" id="noon"><vector name="direction" value="0.2,-1,0.1"/>
+         </emitter>)";
+  return make_scene(files, parts);
+}
+
+GradientResult run(const Scene& scene, const std::vector<std::string>& parameters,
+                   const std::string& method, int spp = 16) {
+  GradientOptions options;
+  options.method = method;
+  options.parameters = parameters;
+  RunSettings settings;
+  settings.spp = spp;
+  settings.seed = 3;
+  settings.threads = 1;
+  return gradient(scene, options, settings);
+}
+
+// Scalars, and a component of every array.
+std::vector<std::string> some_of_all(const Scene& scene) {
+  std::vector<std::string> names;
+  for (const Parameter& p : list_parameters(scene)) {
+    std::string name = p.name;
+    if (p.array.size() == 3) name += ".1.1.g";
+    if (p.array.size() == 2) name += ".2.y";
+    if (p.array.size() == 1) name += ".2";
+    names.push_back(name);
+  }
+  return names;
+}
+
+bool is_zero(const Moments& moments) {
+  for (size_t i = 0; i < moments.size(); ++i)
+    if (moments.mean(i) != 0 || moments.variance(i) != 0) return false;
+  return true;
+}
+
+std::set<std::string> names_of(const GradientResult& result) {
+  std::set<std::string> names;
+  for (const TermRun& term : result.terms) names.insert(term.name);
+  return names;
+}
+
+TEST(ChangedTerms, AreAllThatDifferFromZero) {
+  const TempFiles files;
+  const Scene scene = scene_with_all(files);
+  for (const std::string method : {"silhouettes", "forest"}) {
+    std::set<std::string> zero;  // of some parameter
+    for (const std::string& name : some_of_all(scene)) {
+      SCOPED_TRACE(method + ": " + name);
+      const std::set<std::string> kept = names_of(run(scene, {name}, method, 1));
+      const GradientResult joint = run(scene, {name, "ball.translate.x"}, method, 4);
+      for (size_t t = 0; t < joint.terms.size(); ++t) {
+        if (kept.contains(joint.terms[t].name)) continue;
+        EXPECT_TRUE(is_zero(joint.parameters[0].terms[t])) << joint.terms[t].name;
+        zero.insert(joint.terms[t].name);
+      }
+    }
+    EXPECT_EQ(zero.size(), names_of(run(scene, {"ball.translate.x"}, method)).size() - 1) << method;
+  }
+}
+
+// What is kept differs from zero for some parameter of the kind, so no kind is sampled in vain.
+TEST(ChangedTerms, DoDifferFromZero) {
+  const TempFiles files;
+  const Scene scene = scene_with_all(files);
+  const auto expect_some = [&](const std::vector<std::string>& names, size_t count) {
+    std::set<std::string> differs;
+    for (const std::string& name : names) {
+      const GradientResult result = run(scene, {name}, "silhouettes");
+      EXPECT_EQ(result.terms.size(), count) << name;
+      for (size_t t = 0; t < result.terms.size(); ++t)
+        if (!is_zero(result.parameters[0].terms[t])) differs.insert(result.terms[t].name);
+    }
+    EXPECT_EQ(differs.size(), count) << names[0];
+  };
+  expect_some({"ball.translate.x"}, 6);
+  expect_some({"sensor.translate.x"}, 6);
+  expect_some({"dot.translate.x"}, 2);
+  expect_some({"noon.rotate.x"}, 2);
+  // A beam that turns lights the same shadows in another way.
+  expect_some({"beam.rotate.x"}, 1);
+  expect_some({"clay.reflectance", "gloss.alpha", "glow.radiance", "dot.intensity"}, 1);
+}
+
+// The sums are those of a run with all terms.
+TEST(ChangedTerms, HaveTheSumOfAll) {
+  const TempFiles files;
+  const Scene scene = scene_with_all(files);
+  for (const std::string method : {"adaptive", "silhouettes"}) {
+    for (const std::string name :
+         {"gloss.alpha", "sky.data.2.5.g", "dot.translate.x", "noon.rotate.z", "sky.scale"}) {
+      const Moments a = run(scene, {name}, method).parameters[0].image_sum;
+      const Moments b =
+          run(scene, {name, "ball.translate.x", "sensor.fov"}, method).parameters[0].image_sum;
+      const double error = std::sqrt(a.variance(0) + b.variance(0));
+      EXPECT_LE(std::fabs(a.mean(0) - b.mean(0)), 5 * error) << method << ", " << name;
+    }
+  }
+}
+
+TEST(ChangedTerms, ListEdgesForWhatMovesAlone) {
+  const TempFiles files;
+  const Scene scene = scene_with_all(files);
+  EXPECT_TRUE(run(scene, {"clay.reflectance", "glow.radiance"}, "adaptive").stats.edges.empty());
+  EXPECT_FALSE(run(scene, {"clay.reflectance", "dot.translate.x"}, "adaptive").stats.edges.empty());
+  BackwardOptions options;
+  RunSettings settings;
+  settings.spp = 1;
+  settings.threads = 1;
+  const auto edges_of = [&](const std::string& name) {
+    options.parameters = {name};
+    return backward(scene, Image(8, 8, 3), options, settings).stats.edges.size();
+  };
+  EXPECT_EQ(edges_of("clay.reflectance"), 0u);
+  EXPECT_GT(edges_of("ball.translate.x"), 0u);
+}
+
+// Counts of samples are in the order of the scene's terms, also where some are left out.
+TEST(ChangedTerms, TakeTheirOwnCounts) {
+  const TempFiles files;
+  const Scene scene = scene_with_all(files);
+  GradientOptions options;
+  options.method = "forest";
+  options.parameters = {"dot.translate.x"};
+  options.samples = SampleCounts{2, 0.5, 3, 4};  // interior, camera, boundary, shadow
+  RunSettings settings;
+  settings.spp = 4;
+  settings.threads = 1;
+  const GradientResult result = gradient(scene, options, settings);
+  ASSERT_EQ(result.terms.size(), 2u);
+  EXPECT_EQ(result.terms[0].samples, 2);
+  EXPECT_EQ(result.terms[1].samples, 4);
+}
+
+}  // namespace
+}  // namespace limn
