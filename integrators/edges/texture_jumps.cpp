@@ -18,6 +18,7 @@ std::vector<const Texture*> textures_of(const Shape& shape) {
   for (int k = 0; k < shape.bsdf->texture_count(); ++k) {
     textures.push_back(&shape.bsdf->texture(k));
   }
+  if (shape.radiance_texture) textures.push_back(shape.radiance_texture.get());
   return textures;
 }
 

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "limn/core/light.h"
+#include "limn/core/mesh_attribute.h"
 #include "limn/core/parameter.h"
 #include "limn/core/rng.h"
 #include "limn/integrators/parts.h"
@@ -46,9 +47,23 @@ class Hash {
       for (const Dual* v : ref.values) add(*v);
     }
   }
+  void add_texels(const TexelMap& map) {
+    if (map.map().width == 0) return;
+    for (const float texel : map.texels().data) add(double{texel});
+  }
+  // Of a shape that textures are read on.
+  void add_textures(const Shape& shape) {
+    const Mesh& mesh = shape.mesh;
+    for (const Vec3f& place : mesh.uv_places) add(place);
+    add(mesh.uv_ids);
+    for (const auto& attribute : mesh.attributes) add_texels(*attribute);
+    for (int k = 0; k < shape.bsdf->texture_count(); ++k) add_texels(shape.bsdf->texture(k));
+    if (shape.radiance_texture) add_object(*shape.radiance_texture);
+    if (shape.radiance_texture) add_texels(*shape.radiance_texture);
+  }
   void add_environment(Environment& environment) {
     // One texel of many may lie between the directions.
-    for (const float texel : environment.texels().data) add(double{texel});
+    add_texels(environment);
     constexpr int kDirections = 4096;  // in a spiral
     for (int i = 0; i < kDirections; ++i) {
       const double z = 1 - (2 * i + 1.0) / kDirections;
@@ -93,11 +108,13 @@ std::string fingerprint(const Scene& scene) {
     hash.add(uint64_t{shape.is_emitter});
     for (int k = 0; k < 3; ++k) hash.add(shape.radiance[k]);
     hash.add_object(*shape.bsdf);
+    if (shape.mesh.textured) hash.add_textures(shape);
   }
   if (scene.environment) hash.add_environment(*scene.environment);
   for (const auto& light : scene.delta_lights) {
     hash.add(light->origin().v);
     hash.add_object(*light);
+    if (light->texture()) hash.add_texels(*light->texture());
   }
   return hash.text();
 }

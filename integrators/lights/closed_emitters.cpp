@@ -22,6 +22,7 @@ constexpr const char* kInstead = "use another method (render: path)";
 }  // namespace
 
 void check_closed_light(const Scene& scene) {
+  check_plain_emitters(scene, "analytic");
   if (scene.max_depth == 1) return;
   const SourceLocation whole{scene.file};
   if (scene.max_depth != 2) {

@@ -15,8 +15,20 @@ std::string quoted_name(const std::string& kind, const std::string& id) {
 
 std::string shape_in_text(const Shape& shape) { return quoted_name("shape", shape.id); }
 
+void check_plain_emitters(const Scene& scene, const std::string& method) {
+  for (const Shape& shape : scene.shapes) {
+    if (!shape.radiance_texture) continue;
+    refuse_light(
+        method, shape.where,
+        fmt::format("{}: the light of its emitter is textured: use another method (render: "
+                    "path)",
+                    shape_in_text(shape)));
+  }
+}
+
 void check_direct_light(const Scene& scene, const std::string& method) {
   const SourceLocation whole{scene.file};
+  check_plain_emitters(scene, method);
   if (scene.max_depth != 2) {
     refuse_light(method, whole,
                  fmt::format("it knows direct light alone: ask for that (what: direct), or set the "

@@ -14,8 +14,11 @@ namespace limn {
 std::string quoted_name(const std::string& kind, const std::string& id);
 std::string shape_in_text(const Shape& shape);
 
-// InputError, with what to do, for a scene of other than direct light, for delta lights, and for
-// interpolated normals after Mitsuba.
+// InputError for textured emitters.
+void check_plain_emitters(const Scene& scene, const std::string& method);
+
+// InputError, with what to do, for textured emitters, for a scene of other than direct light, for
+// delta lights, and for interpolated normals after Mitsuba.
 void check_direct_light(const Scene& scene, const std::string& method);
 
 }  // namespace limn

@@ -173,6 +173,7 @@ class PathTracer {
   bool weigh_light(Walk& walk, const Evaluation& evaluation) const;
   void draw_delta(Walk& walk, const DeltaLight& delta) const;
   Rgb<S> light_value(const Walk& walk) const;
+  Rgb<S> emitted(const Walk& walk, const DirectionMotion* motion) const;
   void add_light(Walk& walk) const;
   void add_lights(Walk& walk, int count);
   Rgb<S> direct_light(Walk& walk, const Rng& key);

@@ -184,7 +184,21 @@ inline Rgb<S> PathTracer<S, Visitor>::light_value(const Walk& walk) const {
              walk.light_weight;
     }
   }
-  return walk.light_share * light.light->template drawn_radiance<S>(light) * walk.light_weight;
+  return walk.light_share * emitted(walk, nullptr) * walk.light_weight;
+}
+
+// Radiance of the light that was drawn. motion: of its direction, where that is an emitter's.
+template <class S, class Visitor>
+[[gnu::always_inline]] inline Rgb<S> PathTracer<S, Visitor>::emitted(
+    const Walk& walk, const DirectionMotion* motion) const {
+  const LightSample& light = *walk.light;
+  if (light.face && c_.scene.shape(light.face->shape).radiance_texture) {
+    const bool passes = walk.two_sided && walk.beyond;
+    const Vec3<S> p = passes ? beyond(c_.scene, walk.surface, walk.wi).p : walk.surface.p;
+    return surface_on_ray<S>(c_.scene, *light.face, p, detail::moving<S>(light.wo, motion))
+        .emission(-light.wo, c_.scene.shading);
+  }
+  return light.light->template drawn_radiance<S>(light);
 }
 
 // What a light adds where directions are warped: auxiliary rays are traced for light that
@@ -200,8 +214,8 @@ inline Rgb<S> PathTracer<S, Visitor>::warped_light(const Walk& walk, const Rng& 
   const Vec3<S> direction = detail::moving<S>(light.wo, motion);
   const auto [f, bsdf_pdf] = detail::evaluate(scattering, light.wo, direction, motion);
   const double weight = mis_weight_over_pdf(light.pdf, density(walk, light.wo, bsdf_pdf));
-  const Rgb<S> radiance = motion && !light.face ? light.light->radiance(direction)
-                                                : light.light->template drawn_radiance<S>(light);
+  const Rgb<S> radiance =
+      motion && !light.face ? light.light->radiance(direction) : emitted(walk, motion);
   return detail::stretched(f, light.wo, motion) * radiance * weight;
 }
 

@@ -50,7 +50,10 @@ std::shared_ptr<Bsdf> make_bsdf(Properties& properties) {
 }
 
 ConstantOrTexture read_reflectance(Properties& properties, const char* name, double absent) {
-  if (auto texture = properties.texture(name)) return texture;
+  if (auto texture = properties.texture(name)) {
+    if (texture->range().least >= 0 && texture->range().most <= 1) return texture;
+    properties.fail(name, "the values of the texture must lie in [0, 1]");
+  }
   const Rgb<double> c = properties.rgb(name, grey(absent));
   for (int i = 0; i < 3; ++i) {
     if (!(c[i] >= 0 && c[i] <= 1)) properties.fail(name, "a reflectance must lie in [0, 1]");

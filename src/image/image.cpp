@@ -20,6 +20,7 @@
 
 #include "limn/core/check.h"
 #include "limn/core/error.h"
+#include "limn/core/image_layers.h"
 #include "limn/core/memory.h"
 #include "limn/core/output_file.h"
 
@@ -62,6 +63,31 @@ Imf::FrameBuffer interleaved(T* data, Imf::PixelType type, const std::vector<con
   return buffer;
 }
 
+Imf::Header plain_header(int width, int height, const std::vector<ImageAttribute>& attributes) {
+  Imf::Header header(width, height);
+  header.compression() = Imf::ZIP_COMPRESSION;
+  for (const ImageAttribute& a : attributes) {
+    header.insert(a.name, Imf::StringAttribute(a.value));
+  }
+  return header;
+}
+
+void write_pixels(const std::string& file, const Imf::Header& header,
+                  const Imf::FrameBuffer& buffer, int height) {
+  OutputFile output(file);
+  // Writes to memory first: OpenEXR does not report a full disk when it closes a file.
+  Imf::StdOSStream stream;
+  try {
+    Imf::OutputFile exr(stream, header);
+    exr.setFrameBuffer(buffer);
+    exr.writePixels(height);
+  } catch (const std::exception& e) {
+    throw InputError(SourceLocation{file}, std::string("cannot write: ") + e.what());
+  }
+  output.write(stream.str());
+  output.commit();
+}
+
 void check_is_exr(const std::string& file) {
   errno = 0;
   std::ifstream stream(file, std::ios::binary);
@@ -71,9 +97,7 @@ void check_is_exr(const std::string& file) {
   }
   if (!stream.get(first)) throw InputError(SourceLocation{file}, "cannot read: the file is empty");
   if (!Imf::isOpenExrFile(file.c_str())) {
-    throw InputError(SourceLocation{file},
-                     "is not an OpenEXR image: pictures for the eye (PNG, JPEG) "
-                     "hold no radiance, and must be converted first");
+    throw InputError(SourceLocation{file}, "is not an OpenEXR image");
   }
 }
 
@@ -325,31 +349,36 @@ class ExrReader {
 void write_exr(const std::string& file, const Image& image, bool half,
                const std::vector<ImageAttribute>& attributes) {
   const std::vector<const char*> names = channel_names(image.channels);
-  Imf::Header header(image.width, image.height);
-  header.compression() = Imf::ZIP_COMPRESSION;
+  Imf::Header header = plain_header(image.width, image.height, attributes);
   for (const char* name : names) {
     header.channels().insert(name, Imf::Channel(half ? Imf::HALF : Imf::FLOAT));
   }
-  for (const ImageAttribute& a : attributes) {
-    header.insert(a.name, Imf::StringAttribute(a.value));
+  const Imath::V2i origin(0, 0);
+  std::vector<::half> halves;
+  if (half) halves = to_half(image.data);
+  const Imf::FrameBuffer buffer =
+      half ? interleaved(halves.data(), Imf::HALF, names, image.width, origin)
+           : interleaved(const_cast<float*>(image.data.data()), Imf::FLOAT, names, image.width,
+                         origin);
+  write_pixels(file, header, buffer, image.height);
+}
+
+void write_exr_layers(const std::string& file, const std::vector<ImageLayer>& layers,
+                      const std::vector<ImageAttribute>& attributes) {
+  const int width = layers[0].image.width;
+  Imf::Header header = plain_header(width, layers[0].image.height, attributes);
+  Imf::FrameBuffer buffer;
+  for (const ImageLayer& layer : layers) {
+    const size_t pixel = layer.channels.size() * sizeof(float);
+    for (size_t c = 0; c < layer.channels.size(); ++c) {
+      const std::string name = layer.name + "." + layer.channels[c];
+      header.channels().insert(name, Imf::Channel(Imf::FLOAT));
+      auto* const first = const_cast<float*>(layer.image.data.data()) + c;
+      buffer.insert(name, Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(first), pixel,
+                                     pixel * static_cast<size_t>(width)));
+    }
   }
-  OutputFile output(file);
-  // Writes to memory first: OpenEXR does not report a full disk when it closes a file.
-  Imf::StdOSStream stream;
-  try {
-    const Imath::V2i origin(0, 0);
-    std::vector<::half> halves;
-    if (half) halves = to_half(image.data);
-    Imf::OutputFile exr(stream, header);
-    exr.setFrameBuffer(half ? interleaved(halves.data(), Imf::HALF, names, image.width, origin)
-                            : interleaved(const_cast<float*>(image.data.data()), Imf::FLOAT, names,
-                                          image.width, origin));
-    exr.writePixels(image.height);
-  } catch (const std::exception& e) {
-    throw InputError(SourceLocation{file}, std::string("cannot write: ") + e.what());
-  }
-  output.write(stream.str());
-  output.commit();
+  write_pixels(file, header, buffer, layers[0].image.height);
 }
 
 Image read_exr(const std::string& file) {

@@ -1,12 +1,16 @@
-// Writing of PNG files; the only file that includes libpng.
+// Reading and writing of PNG files; the only file that includes libpng.
 #include <png.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <csetjmp>
+#include <cstring>
 
 #include "limn/core/error.h"
 #include "limn/core/image.h"
 #include "limn/core/output_file.h"
+#include "src/image/formats.h"
 
 namespace limn {
 namespace {
@@ -31,18 +35,117 @@ png_byte to_byte(double x) {
   return x > 0 ? static_cast<png_byte>(std::lround(255 * std::min(x, 1.0))) : png_byte{0};
 }
 
-// The transfer function of sRGB, IEC 61966-2-1.
-double srgb_encode(double linear) {
-  return linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
-}
-
 double channel_mean(const Image& image, int x, int y) {
   double sum = 0;
   for (int c = 0; c < image.channels; ++c) sum += image.at(x, y, c);
   return sum / image.channels;
 }
 
+// Decodes a file in memory. libpng leaves its functions by longjmp after an error, so between here
+// and there nothing may need a destructor.
+class PngReader {
+ public:
+  explicit PngReader(std::string_view data) : left_(data) {
+    png_ = png_create_read_struct(PNG_LIBPNG_VER_STRING, this, on_error, on_warning);
+    info_ = png_ ? png_create_info_struct(png_) : nullptr;
+    if (!info_) {
+      png_destroy_read_struct(&png_, nullptr, nullptr);
+      throw std::bad_alloc();
+    }
+  }
+  ~PngReader() { png_destroy_read_struct(&png_, &info_, nullptr); }
+  PngReader(const PngReader&) = delete;
+  PngReader& operator=(const PngReader&) = delete;
+
+  uint32_t width = 0, height = 0;
+  int channels = 0;
+  bool wide = false;         // two bytes a number, else one
+  const char* message = "";  // of an error
+
+  // Sets the members above; false after an error.
+  bool read_header() {
+    if (setjmp(png_jmpbuf(png_))) return false;  // NOLINT: libpng has no other way
+    png_set_read_fn(png_, this, on_read);
+    png_set_user_limits(png_, PNG_UINT_31_MAX, PNG_UINT_31_MAX);
+    // Profiles, texts and times are passed over, not inflated.
+    png_set_keep_unknown_chunks(png_, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);
+    png_read_info(png_, info_);
+    width = png_get_image_width(png_, info_);
+    height = png_get_image_height(png_, info_);
+    channels = (png_get_color_type(png_, info_) & PNG_COLOR_MASK_COLOR) != 0 ? 3 : 1;
+    wide = png_get_bit_depth(png_, info_) == 16;
+    return true;
+  }
+  // numbers: of all rows, after a header of this size.
+  bool read_rows(png_byte* numbers) {
+    if (setjmp(png_jmpbuf(png_))) return false;  // NOLINT
+    png_set_palette_to_rgb(png_);
+    png_set_expand_gray_1_2_4_to_8(png_);
+    png_set_strip_alpha(png_);
+    if (std::endian::native == std::endian::little) png_set_swap(png_);
+    const int passes = png_set_interlace_handling(png_);
+    png_read_update_info(png_, info_);  // takes memory for a row
+    const size_t row = size_t{width} * static_cast<size_t>(channels) * (wide ? 2 : 1);
+    for (int pass = 0; pass < passes; ++pass) {
+      for (uint32_t y = 0; y < height; ++y) png_read_row(png_, numbers + y * row, nullptr);
+    }
+    png_read_end(png_, nullptr);
+    return true;
+  }
+
+ private:
+  static void on_read(png_structp png, png_bytep out, size_t size) {
+    auto* const reader = static_cast<PngReader*>(png_get_io_ptr(png));
+    if (size > reader->left_.size()) png_error(png, "the file ends too early");
+    std::memcpy(out, reader->left_.data(), size);
+    reader->left_.remove_prefix(size);
+  }
+  [[noreturn]] static void on_error(png_structp png, png_const_charp message) {
+    auto* const reader = static_cast<PngReader*>(png_get_error_ptr(png));
+    std::snprintf(reader->text_, sizeof(reader->text_), "%s", message);
+    reader->message = reader->text_;
+    png_longjmp(png, 1);
+  }
+  static void on_warning(png_structp, png_const_charp) {}
+
+  std::string_view left_;
+  png_structp png_ = nullptr;
+  png_infop info_ = nullptr;
+  char text_[200] = "";
+};
+
 }  // namespace
+
+StoredImage read_png(const std::string& file, std::string_view data) {
+  PngReader reader(data);
+  const auto check = [&](bool read) {
+    if (read) return;
+    throw InputError({file},
+                     std::string("the PNG file is truncated or damaged: ") + reader.message);
+  };
+  check(reader.read_header());
+  // A byte inflates to at most 1032, and a pixel takes at least a bit.
+  constexpr double kPixelsPerByte = 8 * 1032.0;
+  const double pixel = reader.channels * (reader.wide ? 6.0 : 1.0);
+  check_image_size(file, data, reader.width, reader.height, kPixelsPerByte, pixel);
+  StoredImage image{static_cast<int>(reader.width),
+                    static_cast<int>(reader.height),
+                    reader.channels,
+                    true,
+                    {},
+                    {}};
+  const size_t count = size_t{reader.width} * reader.height * static_cast<size_t>(reader.channels);
+  if (!reader.wide) {
+    image.bytes.resize(count);
+    check(reader.read_rows(image.bytes.data()));
+    return image;
+  }
+  std::vector<uint16_t> numbers(count);
+  check(reader.read_rows(reinterpret_cast<png_byte*>(numbers.data())));
+  image.floats.reserve(count);
+  for (const uint16_t v : numbers) image.floats.push_back(static_cast<float>(v) / 65535.0f);
+  return image;
+}
 
 void write_png(const std::string& file, const Image& image, double exposure) {
   std::vector<png_byte> pixels;

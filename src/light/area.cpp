@@ -64,13 +64,15 @@ std::unique_ptr<Light> make_area_light(const Scene& scene, ShapeId shape) {
 }
 
 void read_area(Properties& properties, Scene&, Shape* shape) {
+  shape->is_emitter = true;
+  shape->emitter_id = properties.id();
+  shape->radiance_texture = read_emission(properties, "radiance");
+  if (shape->radiance_texture) return;
   const Rgb<double> radiance = properties.rgb("radiance", grey(1.0));
   for (int i = 0; i < 3; ++i) {
     if (!(radiance[i] >= 0)) properties.fail("radiance", "must not be negative");
     shape->radiance[i] = radiance[i];
   }
-  shape->is_emitter = true;
-  shape->emitter_id = properties.id();
 }
 
 }  // namespace limn

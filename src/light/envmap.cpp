@@ -161,20 +161,6 @@ void MapEnvironment::find_each(std::span<const Found> found) const {
   });
 }
 
-void check_finite(const Image& image, const std::string& file) {
-  for (int y = 0; y < image.height; ++y) {
-    for (int x = 0; x < image.width; ++x) {
-      for (int c = 0; c < image.channels; ++c) {
-        if (std::isfinite(image.at(x, y, c))) continue;
-        throw InputError(SourceLocation{file},
-                         fmt::format("the environment map's pixel (column {}, row {}) is not "
-                                     "finite",
-                                     x, y));
-      }
-    }
-  }
-}
-
 }  // namespace
 
 void read_envmap(Properties& properties, Scene& scene, Shape*) {
@@ -186,8 +172,8 @@ void read_envmap(Properties& properties, Scene& scene, Shape*) {
   if (properties.boolean("mis_compensation", false)) {
     properties.fail("mis_compensation", "is not supported (it changes the noise alone)");
   }
-  const Image image = read_exr(file);
-  check_finite(image, file);
+  const Image image = read_image(file);
+  check_finite(image, file, "the environment map");
   scene.environment =
       std::make_shared<MapEnvironment>(std::make_shared<EnvironmentMap>(image), axes, scale, file);
 }

@@ -43,6 +43,27 @@ void read_light(Properties& properties, Scene& scene, Shape* shape) {
                                            "(known: " + known + ")");
 }
 
+std::shared_ptr<Texture> read_emission(Properties& properties, const char* name) {
+  std::shared_ptr<Texture> texture = properties.texture(name);
+  if (!texture) return nullptr;
+  texture->set_valid({0, std::numeric_limits<float>::max()});
+  if (!(texture->range().least >= 0)) properties.fail(name, "the texture must not be negative");
+  return texture;
+}
+
+std::shared_ptr<Texture> read_light_bitmap(Properties& properties, const char* name) {
+  std::shared_ptr<Texture> texture = read_emission(properties, name);
+  if (texture && texture->map().width == 0) properties.fail(name, "must be a bitmap");
+  return texture;
+}
+
+TexelMap::TexelWeights bitmap_weights(const Texture& bitmap, const std::array<double, 2>& uv,
+                                      double factor) {
+  TexelMap::TexelWeights weights = bitmap.texel_weights({nullptr, FaceId(0), {}, uv});
+  for (TexelMap::TexelWeight& w : weights) w.weight *= factor;
+  return weights;
+}
+
 Rgb<Dual> read_power(Properties& properties, const char* name) {
   const Rgb<double> c = properties.rgb(name, grey(1.0));
   for (int i = 0; i < 3; ++i) {

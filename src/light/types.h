@@ -17,6 +17,13 @@ void read_point(Properties& properties, Scene& scene, Shape* shape);
 void read_projector(Properties& properties, Scene& scene, Shape* shape);
 void read_spot(Properties& properties, Scene& scene, Shape* shape);
 
+// A texture of emitted light; null if the property is none. InputError if it is negative anywhere.
+std::shared_ptr<Texture> read_emission(Properties& properties, const char* name);
+// The same of a light without extent, which must be a bitmap: no edges are known of others.
+std::shared_ptr<Texture> read_light_bitmap(Properties& properties, const char* name);
+// Texels of a light's bitmap at uv, that count `factor` times.
+TexelMap::TexelWeights bitmap_weights(const Texture& bitmap, const std::array<double, 2>& uv,
+                                      double factor);
 // Reads the emitted power of a delta light: 1 if absent; finite and not negative.
 Rgb<Dual> read_power(Properties& properties, const char* name);
 // The columns of to_world, orthonormalised: a rotation or reflection with an optional uniform

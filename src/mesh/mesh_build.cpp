@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace limn {
 
@@ -59,12 +60,14 @@ size_t keep_faces(Mesh& mesh, const Keep& keep) {
     for (auto* corners : {&mesh.faces, &mesh.normal_ids, &mesh.uv_ids}) {
       if (!corners->empty()) (*corners)[kept] = (*corners)[f];
     }
+    if (!mesh.file_faces.empty()) mesh.file_faces[kept] = mesh.file_faces[f];
     ++kept;
   }
   const size_t dropped = mesh.faces.size() - kept;
   for (auto* corners : {&mesh.faces, &mesh.normal_ids, &mesh.uv_ids}) {
     if (!corners->empty()) corners->resize(kept);
   }
+  if (!mesh.file_faces.empty()) mesh.file_faces.resize(kept);
   return dropped;
 }
 
@@ -246,6 +249,10 @@ Mesh build_mesh(const RawMesh& raw, const MeshOptions& options,
     mesh.uv_source = raw.uv_source;
     mesh.uv_places = raw.uv_places;
     mesh.uv_ids = raw.uv_ids;
+    if (options.file_faces) {
+      mesh.file_faces.resize(raw.faces.size());
+      std::iota(mesh.file_faces.begin(), mesh.file_faces.end(), 0u);
+    }
   }
   const bool given = mesh.normal_source == NormalSource::kGiven;
   set_faces(mesh, raw, options.flip_normals != (given && mirrors(options.to_world)));
@@ -291,6 +298,8 @@ Mesh moved_mesh(const Mesh& mesh, std::vector<Vec3f> positions, const SourceLoca
   moved.uv_source = mesh.uv_source;
   moved.uv_places = mesh.uv_places;
   moved.uv_ids = mesh.uv_ids;
+  moved.attributes = mesh.attributes;
+  moved.file_faces = mesh.file_faces;
   if (mesh.normal_source == NormalSource::kGiven) {
     moved.normals = mesh.normals;
     moved.normal_ids = mesh.normal_ids;

@@ -1,5 +1,6 @@
 #pragma once
 // Converts a mesh as read from a file to a checked mesh in world space.
+#include <array>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,12 @@ struct RawMesh {
   UvSource uv_source = UvSource::kNone;
   std::vector<Vec3f> uv_places = {};
   std::vector<FaceIndices> uv_ids = {};  // F by 3, into uv_places
+  // Of vertices (V) or faces (F), by the beginning of its name; see mesh_attribute.h.
+  struct Attribute {
+    std::string name;
+    std::vector<std::array<float, 3>> values;
+  };
+  std::vector<Attribute> attributes = {};
 };
 
 // update_shading_normals; returns the number of vertices whose adjacent normals cancel, so that a
@@ -37,6 +44,7 @@ struct MeshOptions {
   bool flip_normals = false;  // reverse orientation and normals
   bool textured = false;      // keep texture coordinates, see Mesh::textured
   bool tangents = false;      // see Mesh::has_tangents; requires texture coordinates
+  bool file_faces = false;    // keep those of textured meshes, too
 };
 
 // True if the transform is a reflection (possibly combined with other transforms).

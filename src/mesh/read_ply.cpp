@@ -362,6 +362,55 @@ std::optional<std::array<size_t, 2>> uv_indices(const PlyElement& element) {
   return std::nullopt;
 }
 
+// An attribute, and the properties that are its numbers: one or three.
+struct PlyAttribute {
+  RawMesh::Attribute attribute;
+  std::vector<size_t> properties;
+
+  void add(const std::vector<std::vector<double>>& values) {
+    std::array<float, 3> numbers{};
+    for (size_t c = 0; c < 3; ++c) {
+      const double v = values[properties[std::min(c, properties.size() - 1)]][0];
+      numbers[c] = std::fabs(v) <= FLT_MAX ? static_cast<float>(v) : NAN;
+    }
+    attribute.values.push_back(numbers);
+  }
+};
+
+// Properties that share what stands before their last "_" are an attribute; r g b, or red green
+// blue, are "color". kind: "vertex_" or "face_".
+std::vector<PlyAttribute> find_attributes(const PlyElement& element, const std::string& kind) {
+  std::vector<PlyAttribute> found;
+  constexpr const char* kColours[][3] = {{"r", "g", "b"}, {"red", "green", "blue"}};
+  for (const auto& [r, g, b] : kColours) {
+    const auto i = scalar_index(element, r), j = scalar_index(element, g),
+               k = scalar_index(element, b);
+    if (!i || !j || !k || !found.empty()) continue;
+    found.emplace_back().attribute.name = kind + "color";
+    found[0].properties = {*i, *j, *k};
+  }
+  for (size_t i = 0; i < element.properties.size(); ++i) {
+    const PlyProperty& property = element.properties[i];
+    const size_t end = property.name.rfind('_');
+    if (end == std::string::npos || property.list_size || property.name.starts_with("texture_")) {
+      continue;
+    }
+    const std::string name = kind + property.name.substr(0, end);
+    size_t same = 0;
+    while (same < found.size() && found[same].attribute.name != name) ++same;
+    if (same == found.size()) found.emplace_back().attribute.name = name;
+    found[same].properties.push_back(i);
+  }
+  std::erase_if(found, [](const PlyAttribute& a) {
+    return a.properties.size() != 1 && a.properties.size() != 3;
+  });
+  return found;
+}
+
+void keep(std::vector<PlyAttribute>& attributes, RawMesh& mesh) {
+  for (PlyAttribute& a : attributes) mesh.attributes.push_back(std::move(a.attribute));
+}
+
 void read_vertices(PlyCursor& in, const PlyElement& element, RawMesh& mesh) {
   std::array<std::optional<size_t>, 3> p, n;
   for (int k = 0; k < 3; ++k) {
@@ -372,6 +421,7 @@ void read_vertices(PlyCursor& in, const PlyElement& element, RawMesh& mesh) {
   }
   const bool has_normals = n[0] && n[1] && n[2];
   const auto uv = uv_indices(element);
+  std::vector<PlyAttribute> attributes = find_attributes(element, "vertex_");
   std::vector<std::vector<double>> values;
   for (uint64_t i = 0; i < element.count; ++i) {
     read_element(in, element, i, values);
@@ -387,10 +437,12 @@ void read_vertices(PlyCursor& in, const PlyElement& element, RawMesh& mesh) {
     }
     mesh.positions.push_back(position);
     if (has_normals) mesh.normals.push_back(normal);
+    for (PlyAttribute& a : attributes) a.add(values);
     if (!uv) continue;
     mesh.uv_places.push_back(
         {static_cast<float>(values[(*uv)[0]][0]), static_cast<float>(values[(*uv)[1]][0]), 0});
   }
+  keep(attributes, mesh);
 }
 
 void read_faces(PlyCursor& in, const PlyElement& element, uint64_t vertex_count, RawMesh& mesh) {
@@ -405,6 +457,7 @@ void read_faces(PlyCursor& in, const PlyElement& element, uint64_t vertex_count,
   if (!is_integer(element.properties[list].type)) {
     in.fail_at(element.line, "vertex_indices must be integers");
   }
+  std::vector<PlyAttribute> attributes = find_attributes(element, "face_");
   std::vector<std::vector<double>> values;
   for (uint64_t i = 0; i < element.count; ++i) {
     read_element(in, element, i, values);
@@ -424,7 +477,9 @@ void read_faces(PlyCursor& in, const PlyElement& element, uint64_t vertex_count,
       face[k] = static_cast<uint32_t>(corners[k]);
     }
     mesh.faces.push_back(face);
+    for (PlyAttribute& a : attributes) a.add(values);
   }
+  keep(attributes, mesh);
 }
 
 }  // namespace

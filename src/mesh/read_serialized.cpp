@@ -96,7 +96,14 @@ class MeshReader {
         mesh.uv_places.push_back({static_cast<float>(v[0]), static_cast<float>(v[1]), 0});
       });
     }
-    if (flags & kHasColours) for_numbers(vertices, 3, [](const double*) {});
+    if (flags & kHasColours) {
+      RawMesh::Attribute& colours = mesh.attributes.emplace_back();
+      colours.name = "vertex_color";
+      for_numbers(vertices, 3, [&](const double* v) {
+        colours.values.push_back(
+            {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])});
+      });
+    }
     mesh.faces.resize(faces);
     take(mesh.faces.data(), faces * sizeof(FaceIndices));
     check_faces(mesh.faces, vertices);

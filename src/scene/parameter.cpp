@@ -51,6 +51,39 @@ size_t edit_distance(const std::string& a, const std::string& b) {
   throw UnknownParameter({scene.file}, message);
 }
 
+// Whether a texture in use jumps where no edge is known: then nothing may move.
+bool has_texel_borders(const Scene& scene) {
+  const auto jumps = [](const Texture* texture) {
+    return texture && texture->jumps_between_texels();
+  };
+  for (const Shape& shape : scene.shapes) {
+    if (jumps(shape.radiance_texture.get())) return true;
+    for (int k = 0; k < shape.bsdf->texture_count(); ++k) {
+      if (jumps(&shape.bsdf->texture(k))) return true;
+    }
+  }
+  return std::any_of(scene.delta_lights.begin(), scene.delta_lights.end(),
+                     [&](const auto& light) { return jumps(light->texture()); });
+}
+
+void add_moving_parameters(const Scene& scene, std::vector<Parameter>& list) {
+  add_shape_parameters(scene, list);
+  add_camera_parameters(scene, list);
+}
+
+void check_nothing_moves(const Scene& scene, const std::string& name) {
+  std::vector<Parameter> moving;
+  add_moving_parameters(scene, moving);
+  for (const Parameter& p : moving) {
+    if (name != p.name && !name.starts_with(p.name + ".") && !name.starts_with(p.name + ":")) {
+      continue;
+    }
+    throw InputError({scene.file}, "parameter \"" + name +
+                                       "\": texels' borders would move unseen, of a texture "
+                                       "with filter_type nearest: use bilinear");
+  }
+}
+
 }  // namespace
 
 std::vector<size_t> Parameter::shape() const {
@@ -151,8 +184,7 @@ Image Parameter::texel_velocities(const Scene& scene, size_t component) const {
 std::vector<Parameter> list_parameters(const Scene& scene) {
   std::vector<Parameter> list;
   if (scene.camera.is_orthographic()) return list;
-  add_shape_parameters(scene, list);
-  add_camera_parameters(scene, list);
+  if (!has_texel_borders(scene)) add_moving_parameters(scene, list);
   add_bsdf_parameters(scene, list);
   add_emitter_parameters(scene, list);
   add_texel_parameters(scene, list);
@@ -174,6 +206,7 @@ Parameter find_parameter_or_array(const Scene& scene, const std::string& name) {
     const auto part = p.motion->part(scene, p, name.substr(p.name.size()));
     if (part) return *part;
   }
+  if (has_texel_borders(scene)) check_nothing_moves(scene, name);
   fail_unknown(scene, name, list);
 }
 

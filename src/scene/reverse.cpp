@@ -184,8 +184,8 @@ Rgb<Var> texture_value(const Texture& texture, const TexturePoint<Dual>& point, 
   for (int k = 0; k < 2; ++k) jacobian.add(b[k].node, f.r.d[k], f.g.d[k], f.b.d[k]);
   Tape& tape = *Tape::current();
   const SceneSlots& slots = *tape.slots();
-  if (const uint32_t slot =
-          texture.is_tangent() ? slots.mesh(shape).directions : slots.of(&texture)) {
+  if (const uint32_t slot = texture.is_tangent() ? slots.mesh(shape).directions
+                                                 : slots.of(&texture.texels_on(*point.mesh))) {
     const TexturePoint<double> here{
         point.mesh, point.face, {b[0].v, b[1].v}, {point.uv[0].v, point.uv[1].v}};
     for (const auto& [texel, weight] : texture.texel_weights(here)) {
@@ -216,6 +216,13 @@ void TexturesAt<Var>::resolve(const Bsdf& bsdf, const SurfacePoint<Var>& point) 
 }
 
 namespace detail {
+
+template <>
+Rgb<Var> textured_radiance<Var>(const Shape& shape, FaceId face, const std::array<Var, 2>& b) {
+  const std::array<Dual, 2> along = {Dual(b[0].v, {1, 0, 0, 0}), Dual(b[1].v, {0, 1, 0, 0})};
+  return texture_value(*shape.radiance_texture, texture_point<Dual>(shape.mesh, face, along),
+                       ShapeId(), b);
+}
 
 namespace {
 
@@ -406,6 +413,14 @@ std::optional<Arrival<Var>> arrival<Var>(const DeltaLight& light, const Vec3<Var
       const auto seeded = *copy.object->arriving(detail::held(p));
       direction.add(nodes, as_colour(seeded.wo));
       irradiance.add(nodes, seeded.irradiance);
+    }
+  }
+  if (const uint32_t slot = light.texture() ? Tape::current()->slots()->of(light.texture()) : 0) {
+    for (const auto& [texel, weight] : light.texel_weights(value(p))) {
+      for (uint32_t c = 0; c < 3; ++c) {
+        irradiance.add(Tape::current()->leaf(slot + 3 * texel + c), c == 0 ? weight : 0,
+                       c == 1 ? weight : 0, c == 2 ? weight : 0);
+      }
     }
   }
   const Rgb<Var> wo = direction.result(as_colour(at->wo));

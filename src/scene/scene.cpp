@@ -1,6 +1,7 @@
 // Deep copies of scenes, and the choice of a sensor.
 #include "limn/core/scene.h"
 
+#include "limn/core/mesh_attribute.h"
 #include "limn/core/set_shading.h"
 
 namespace limn {
@@ -46,7 +47,13 @@ const Shape* find_smooth(const Scene& scene) {
 Scene deep_copy(const Scene& scene) {
   Scene copy = scene;
   BsdfCopies copies;
-  for (Shape& shape : copy.shapes) shape.bsdf = copy_once(shape.bsdf, copies);
+  for (Shape& shape : copy.shapes) {
+    shape.bsdf = copy_once(shape.bsdf, copies);
+    if (shape.radiance_texture) shape.radiance_texture = shape.radiance_texture->clone();
+    for (auto& attribute : shape.mesh.attributes) {
+      attribute = std::make_shared<MeshAttribute>(*attribute);
+    }
+  }
   for (auto& [id, bsdf] : copy.bsdfs_by_id) bsdf = copy_once(bsdf, copies);
   if (scene.environment) copy.environment = scene.environment->clone();
   for (auto& light : copy.delta_lights) light = light->clone();

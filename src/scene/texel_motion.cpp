@@ -1,4 +1,5 @@
-// Motions of the texels of an environment map or a texture: along a field, or single texels.
+// Motions of the texels of an environment map, a texture or an attribute of a mesh: along a field,
+// or single texels.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -7,6 +8,7 @@
 
 #include "limn/core/check.h"
 #include "limn/core/environment.h"
+#include "limn/core/mesh_attribute.h"
 #include "src/base/text.h"
 #include "src/scene/motion.h"
 #include "src/scene/motion_lists.h"
@@ -137,7 +139,8 @@ class TexelArray final : public TexelMotion {
  private:
   static std::optional<Parameter> component(const Scene& scene, const Parameter& whole,
                                             const std::string& text) {
-    const std::vector<std::string_view> words = split(text, ".");
+    std::vector<std::string_view> words = split(text, ".");
+    if (words.size() == 2 && whole.array[0] == 1) words.insert(words.begin(), "0");
     if (words.size() != 3 || words[2].size() != 1) return std::nullopt;
     const std::optional<int64_t> row = parse_integer(words[0]), column = parse_integer(words[1]);
     const size_t channel = std::string_view("rgb").find(words[2][0]);
@@ -177,9 +180,24 @@ void add_map(const Scene& scene, const Texels& texels, std::vector<Parameter>& l
   list.back().most = map.most;
 }
 
+// Attributes of its mesh, and the texture of the light that it emits.
+void add_texels_of_shape(const Scene& scene, size_t s, std::vector<Parameter>& list) {
+  const Shape& shape = scene.shapes[s];
+  for (size_t k = 0; k < shape.mesh.attributes.size() && !shape.id.empty(); ++k) {
+    const auto find = [s, k](Scene& copy) -> TexelMap* {
+      return copy.shapes[s].mesh.attributes[k].get();
+    };
+    add_map(scene, {find, shape.id + "." + shape.mesh.attributes[k]->name()}, list);
+  }
+  if (shape.emitter_id.empty() || !shape.radiance_texture) return;
+  const auto find = [s](Scene& copy) -> TexelMap* { return copy.shapes[s].radiance_texture.get(); };
+  add_map(scene, {find, shape.emitter_id + ".radiance.data"}, list);
+}
+
 }  // namespace
 
 void add_texel_parameters(const Scene& scene, std::vector<Parameter>& list) {
+  for (size_t s = 0; s < scene.shapes.size(); ++s) add_texels_of_shape(scene, s, list);
   for (const auto& [id, bsdf] : scene.bsdfs_by_id) {
     for (int k = 0; k < bsdf->texture_count(); ++k) {
       const auto find = [id = id, k](Scene& copy) -> TexelMap* {
@@ -187,6 +205,12 @@ void add_texel_parameters(const Scene& scene, std::vector<Parameter>& list) {
       };
       add_map(scene, {find, id + "." + bsdf->texture_name(k) + ".data"}, list);
     }
+  }
+  for (size_t i = 0; i < scene.delta_lights.size(); ++i) {
+    const DeltaLight& light = *scene.delta_lights[i];
+    if (light.id.empty() || !light.texture()) continue;
+    const auto find = [i](Scene& copy) -> TexelMap* { return copy.delta_lights[i]->texture(); };
+    add_map(scene, {find, light.id + "." + light.texture_name() + ".data"}, list);
   }
   if (!scene.environment || scene.environment_id.empty()) return;
   const auto find = [](Scene& copy) -> TexelMap* { return copy.environment.get(); };

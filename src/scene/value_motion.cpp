@@ -121,7 +121,7 @@ void add_bsdf_parameters(const Scene& scene, std::vector<Parameter>& list) {
 void add_emitter_parameters(const Scene& scene, std::vector<Parameter>& list) {
   for (size_t i = 0; i < scene.shapes.size(); ++i) {
     const Shape& shape = scene.shapes[i];
-    if (shape.emitter_id.empty()) continue;
+    if (shape.emitter_id.empty() || shape.radiance_texture) continue;
     const Rgb<double> c = value(shape.radiance);
     list.push_back(
         value_parameter(shape.emitter_id + ".radiance", {c.r, c.g, c.b}, [i](Scene& copy) {
@@ -139,7 +139,10 @@ void add_emitter_parameters(const Scene& scene, std::vector<Parameter>& list) {
     DeltaLight& light = *scene.delta_lights[i];
     if (light.id.empty()) continue;
     const auto owner = [i](Scene& copy) { return copy.delta_lights[i]; };
-    add_values(light.id, light.parameters(), owner, list, &light, scene_size(scene));
+    std::vector<ParameterRef> values = light.parameters();
+    // Of what moves the borders of texels only the power, which comes first, is left.
+    if (light.texture() && light.texture()->jumps_between_texels()) values.resize(1);
+    add_values(light.id, values, owner, list, &light, scene_size(scene));
   }
 }
 

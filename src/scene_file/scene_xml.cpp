@@ -1,10 +1,13 @@
 // Builds the scene from its description.
+#include <fmt/format.h>
+
 #include <cmath>
 #include <filesystem>
 #include <stdexcept>
 
 #include "limn/core/face_overlaps.h"
 #include "limn/core/memory.h"
+#include "limn/core/mesh_attribute.h"
 #include "limn/core/names.h"
 #include "limn/core/scene.h"
 #include "src/mesh/mesh_build.h"
@@ -115,13 +118,16 @@ class SceneBuilder {
     return made;
   }
 
-  // A new object each time: every BSDF has textures of its own.
+  // Every BSDF has textures of its own: copies of one that is read once, with the same texels.
   std::shared_ptr<Texture> texture(const ObjectDescription& object) {
-    note_data_file(object);
-    DescribedProperties p(object, description_, make_nested_);
-    std::shared_ptr<Texture> made = make_texture(p);
-    p.check_all_used();
-    return made;
+    std::shared_ptr<Texture>& made = textures_[&object];
+    if (!made) {
+      note_data_file(object);
+      DescribedProperties p(object, description_, make_nested_);
+      made = make_texture(p);
+      p.check_all_used();
+    }
+    return made->clone();
   }
 
   void add_light(const ObjectDescription& object) {
@@ -275,14 +281,91 @@ class SceneBuilder {
     instance_ = {};
   }
 
-  static void check_needs_no_uv(const Bsdf& bsdf, const RawMesh& raw,
-                                const ObjectDescription& object) {
-    for (int k = 0; k < bsdf.texture_count(); ++k) {
-      if (!bsdf.texture(k).needs_uv()) continue;
-      throw InputError(object.where, "no texture coordinates in " + raw.where.file +
-                                         ", needed by the texture of \"" + bsdf.texture_name(k) +
-                                         "\"");
+  // The textures of a shape, by what they give.
+  static std::vector<std::pair<std::string, Texture*>> textures_of(const Shape& shape) {
+    std::vector<std::pair<std::string, Texture*>> textures;
+    for (int k = 0; k < shape.bsdf->texture_count(); ++k) {
+      textures.emplace_back(shape.bsdf->texture_name(k), &shape.bsdf->texture(k));
     }
+    if (shape.radiance_texture) textures.emplace_back("radiance", shape.radiance_texture.get());
+    return textures;
+  }
+
+  // That the mesh has what textures read. Returns the attributes among that.
+  static std::vector<std::string> check_textures(const Shape& shape, const RawMesh& raw) {
+    std::vector<std::string> wanted;
+    for (const auto& [name, texture] : textures_of(shape)) {
+      if (texture->needs_uv() && raw.uv_source == UvSource::kNone) {
+        throw InputError(shape.where, "no texture coordinates in " + raw.where.file +
+                                          ", needed by the texture of \"" + name + "\"");
+      }
+      const std::string attribute = texture->attribute();
+      if (attribute.empty()) continue;
+      std::vector<std::string> known;
+      for (const RawMesh::Attribute& a : raw.attributes) known.push_back(a.name);
+      if (std::find(known.begin(), known.end(), attribute) == known.end()) {
+        throw InputError(shape.where, "no attribute " + attribute + " in " + raw.where.file +
+                                          ", needed by the texture of \"" + name + "\" (" +
+                                          known_names(known) + ")");
+      }
+      wanted.push_back(attribute);
+    }
+    return wanted;
+  }
+
+  // Keeps the attributes of these names.
+  static void add_attributes(const RawMesh& raw, const std::vector<std::string>& names,
+                             Mesh& mesh) {
+    for (const auto& [name, values] : raw.attributes) {
+      if (std::find(names.begin(), names.end(), name) == names.end()) continue;
+      for (size_t i = 0; i < values.size(); ++i) {
+        for (const float v : values[i]) {
+          if (std::isfinite(v)) continue;
+          throw InputError(raw.where,
+                           name + " " + std::to_string(i) + " (counted from 0) is not finite");
+        }
+      }
+      mesh.attributes.push_back(std::make_shared<MeshAttribute>(name, values));
+    }
+  }
+
+  // That attributes have values that their textures may give.
+  static void check_attributes(const Shape& shape) {
+    for (const auto& [name, texture] : textures_of(shape)) {
+      for (const auto& attribute : shape.mesh.attributes) {
+        if (attribute->name() != texture->attribute()) continue;
+        const double scale = texture->attribute_scale();
+        const Texture::Range valid{texture->valid().least / scale, texture->valid().most / scale};
+        attribute->restrict_to(valid);
+        const Texture::Range range = attribute->range();
+        if (range.least >= valid.least && range.most <= valid.most) continue;
+        throw InputError(
+            shape.where,
+            fmt::format("the values of {} lie in [{:g}, {:g}], but {} needs "
+                        "[{:g}, {:g}]: give the texture a scale",
+                        attribute->name(), range.least, range.most, name, valid.least, valid.most));
+      }
+    }
+  }
+
+  // Of a textured emitter: by which lights are chosen.
+  static void set_mean_radiance(Shape& shape) {
+    Rgb<double> sum;
+    double area = 0;
+    for (uint32_t f = 0; f < shape.mesh.faces.size(); ++f) {
+      constexpr int kPoints = 8;  // along a side; not tuned
+      const auto c = face_corners<double>(shape.mesh, FaceId(f));
+      const double part = length(cross(c[1] - c[0], c[2] - c[0]));
+      for (int i = 0; i < kPoints * kPoints; ++i) {
+        std::array<double, 2> b{(i % kPoints + 0.5) / kPoints, (i / kPoints + 0.5) / kPoints};
+        if (b[0] + b[1] > 1) b = {1 - b[0], 1 - b[1]};
+        const auto point = texture_point<double>(shape.mesh, FaceId(f), b);
+        sum += shape.radiance_texture->eval(point) * (part / (kPoints * kPoints));
+      }
+      area += part;
+    }
+    const Rgb<double> mean = sum * (1 / area);
+    shape.radiance = {mean.r, mean.g, mean.b};
   }
 
   void add_shape(const ObjectDescription& object, const std::string& id) {
@@ -300,10 +383,15 @@ class SceneBuilder {
     check_memory(raw);
     const double grey_value = shape.is_emitter ? 0.0 : 0.5;
     shape.bsdf = bsdfs.empty() ? make_diffuse(grey(grey_value)) : bsdfs[0];
-    options.textured = shape.bsdf->texture_count() > 0;
+    options.textured = shape.bsdf->texture_count() > 0 || shape.radiance_texture;
     options.tangents = shape.bsdf->needs_tangent();
-    if (raw.uv_source == UvSource::kNone) check_needs_no_uv(*shape.bsdf, raw, object);
+    const std::vector<std::string> attributes = check_textures(shape, raw);
+    options.file_faces = std::any_of(attributes.begin(), attributes.end(),
+                                     [](const auto& name) { return name.starts_with("face_"); });
     shape.mesh = build_mesh(raw, options, &warnings_);
+    add_attributes(raw, attributes, shape.mesh);
+    check_attributes(shape);
+    if (shape.radiance_texture) set_mean_radiance(shape);
     scene_.shapes.push_back(std::move(shape));
   }
 
@@ -313,6 +401,7 @@ class SceneBuilder {
   Makers make_nested_;
   Scene scene_;
   std::map<const ObjectDescription*, std::shared_ptr<Bsdf>> bsdfs_;
+  std::map<const ObjectDescription*, std::shared_ptr<Texture>> textures_;
   int bsdf_depth_ = 0;
   static constexpr size_t kMostInstancedFaces = 10000000;  // not tuned
   Matrix4 instance_;                                       // of the shapes that are added

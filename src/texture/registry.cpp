@@ -16,7 +16,9 @@ struct TextureType {
 };
 
 constexpr TextureType kTypes[] = {
+    {"bitmap", read_bitmap},
     {"checkerboard", read_checkerboard},
+    {"mesh_attribute", read_mesh_attribute},
 };
 
 }  // namespace

@@ -9,7 +9,9 @@
 
 namespace limn {
 
+std::shared_ptr<Texture> read_bitmap(Properties& properties);
 std::shared_ptr<Texture> read_checkerboard(Properties& properties);
+std::shared_ptr<Texture> read_mesh_attribute(Properties& properties);
 
 // A texture's own map of the surface's texture coordinates: affine.
 struct UvTransform {

@@ -168,6 +168,24 @@ void run_exr(Bytes bytes) {
   }
 }
 
+void run_image(const char* name, Bytes bytes) {
+  const std::string file = written(name, bytes);
+  try {
+    const StoredImage image = read_stored_image(file);
+    demand(image.width > 0 && image.height > 0, "an image has pixels");
+    demand(image.channels == 1 || image.channels == 3, "an image has one channel or three");
+    demand(image.bytes.size() + image.floats.size() ==
+               size_t{1} * image.width * image.height * image.channels,
+           "an image has its values");
+    for (const float v : read_image(file).data) demand(v >= 0 && std::isfinite(v), "values");
+  } catch (const InputError&) {
+  }
+}
+void run_png(Bytes bytes) { run_image("image.png", bytes); }
+void run_jpeg(Bytes bytes) { run_image("image.jpg", bytes); }
+void run_rgbe(Bytes bytes) { run_image("image.hdr", bytes); }
+void run_bmp(Bytes bytes) { run_image("image.bmp", bytes); }
+
 // A width, a channel count and the texels, as many rows as come.
 void run_environment(Bytes bytes) {
   if (bytes.size() < 2) return;
@@ -201,7 +219,11 @@ const FuzzTarget kAllFuzzTargets[kFuzzTargets] = {{"xml", run_xml},
                                                   {"velocity", run_velocity},
                                                   {"environment", run_environment},
                                                   {"serialized", run_serialized},
-                                                  {"spectrum", run_spectrum}};
+                                                  {"spectrum", run_spectrum},
+                                                  {"png", run_png},
+                                                  {"jpeg", run_jpeg},
+                                                  {"rgbe", run_rgbe},
+                                                  {"bmp", run_bmp}};
 
 const FuzzTarget& fuzz_target(const std::string& name) {
   for (const FuzzTarget& target : kAllFuzzTargets)

@@ -16,7 +16,7 @@ struct FuzzTarget {
   void (*run)(Bytes bytes);
 };
 
-inline constexpr int kFuzzTargets = 8;
+inline constexpr int kFuzzTargets = 12;
 extern const FuzzTarget kAllFuzzTargets[kFuzzTargets];
 
 // The target of this name; std::abort() without one.

@@ -170,9 +170,11 @@ const Strings kContracts = {"check.h",
                             "parameter_ref.h",
                             "texel_map.h",
                             "texture.h",
+                            "mesh_attribute.h",
                             "bsdf.h",
                             "properties.h",
                             "image.h",
+                            "image_layers.h",
                             "film.h",
                             "camera.h",
                             "light.h",
@@ -225,6 +227,7 @@ TEST(Includes, OneDoorPerThirdParty) {
       {"Embree", std::regex("^embree[34]/.*")},
       {"OpenEXR", std::regex("^(Imf|Iex|half\\.h|openexr|OpenEXR/).*")},
       {"libpng", std::regex("^png.*")},
+      {"libjpeg", std::regex("^(jpeglib|jerror).*")},
       {"zlib", std::regex("^zlib.*")},
       {"pugixml", std::regex("^pugixml.*")},
       {"tinyobjloader", std::regex("^tiny_obj_loader.*")},
@@ -241,7 +244,7 @@ TEST(Includes, OneDoorPerThirdParty) {
     }
   }
   for (const char* library :
-       {"Embree", "OpenEXR", "libpng", "pugixml", "TBB", "tinyobjloader", "zlib"}) {
+       {"Embree", "OpenEXR", "libjpeg", "libpng", "pugixml", "TBB", "tinyobjloader", "zlib"}) {
     ASSERT_EQ(doors[library].size(), 1u) << library;
   }
   for (const auto& [library, files] : doors) {

@@ -151,7 +151,7 @@ class BackwardCommand final : public Command {
       return loss;
     }
     settings.seconds *= kImageShare;
-    const Image target = read_exr(target_);
+    const Image target = read_image(target_);
     check_loss_images(scene, target, {}, target_);
     loss_.method = loss_method(options_.method);
     loss_.points = options_.points;

@@ -205,8 +205,8 @@ std::vector<FitView> FitCommand::read_views(const FitArguments& arguments) {
       common.shading = arguments.shading;
       read.scene = load_scene(common, warnings_);
     }
-    read.target = read_exr(view.target);
-    if (!view.mask.empty()) read.mask = read_exr(view.mask);
+    read.target = read_image(view.target);
+    if (!view.mask.empty()) read.mask = read_image(view.mask);
     check_loss_images(read.scene, read.target, read.mask, view.target, view.mask);
     views.push_back(std::move(read));
   }

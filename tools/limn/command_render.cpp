@@ -1,6 +1,9 @@
 // `limn render`: an image as EXR and PNG.
 #include <algorithm>
+#include <sstream>
 
+#include "limn/core/names.h"
+#include "limn/integrators/layers.h"
 #include "limn/integrators/methods.h"
 #include "limn/integrators/render.h"
 #include "tools/limn/command_support.h"
@@ -22,7 +25,14 @@ class RenderCommand final : public Command {
     app.add_option("-o,--output", output_, "Image to write (.exr); a .png is written beside it")
         ->required();
     options_.generator = kGenerators[0];
-    visit_options(options_, OptionAdder(app));
+    const OptionAdder add(app);
+    visit_options(options_, all_but({"what"}, add));
+    app.add_option("--what", what_,
+                   "What the image shows: all light (image), direct light, ambient occlusion (ao) "
+                   "or openness of the sky (both need the method silhouettes, lines or rays); or "
+                   "layers of one file, with commas: " +
+                       limn::join(layer_names()))
+        ->capture_default_str();
     add_debug_option(app, debug_);
     add_part_option(app, common_);
   }
@@ -32,10 +42,12 @@ class RenderCommand final : public Command {
   }
 
   int run(const std::string& command_line) override {
+    const bool layers = check_what();
     check_options();
     const Scene scene = load_scene(common_, warnings_);
     const RunSettings settings =
         settings_for(options_.points, make_settings(common_, scene, name()));
+    if (layers) return write_layers(scene, settings, command_line);
     if (!debug_.empty()) {
       for (const auto& line : trace_sample(scene, settings, parse_place(debug_), options_)) {
         fmt::print("{}\n", line);
@@ -61,6 +73,51 @@ class RenderCommand final : public Command {
   }
 
  private:
+  // True for layers; else sets what the image shows.
+  bool check_what() {
+    std::vector<std::string> known(std::begin(kRenderWhat), std::end(kRenderWhat));
+    const auto image = std::find(known.begin(), known.end(), what_);
+    if (image != known.end()) {
+      options_.what = static_cast<RenderWhat>(image - known.begin());
+      return false;
+    }
+    const std::vector<std::string> layers = layer_names();
+    known.insert(known.end(), layers.begin(), layers.end());
+    for (const std::string& name : split_names(what_)) {
+      if (std::find(layers.begin(), layers.end(), name) != layers.end()) continue;
+      throw InputError("--what: " + unknown_name("word", name, known));
+    }
+    refuse_options(*app_,
+                   {"--method", "--generator", "--film", "--points", "--part", "--debug-sample"},
+                   "not for layers (--what)");
+    return true;
+  }
+  static std::vector<std::string> split_names(const std::string& text) {
+    std::vector<std::string> names;
+    std::istringstream stream(text);
+    for (std::string name; std::getline(stream, name, ',');) names.push_back(name);
+    return names;
+  }
+  int write_layers(const Scene& scene, const RunSettings& settings,
+                   const std::string& command_line) {
+    check_output(output_);
+    check_outputs({{"-o", output_}}, scene);
+    const LayersResult result = render_layers(scene, split_names(what_), settings);
+    if (result.spp == 0) {
+      fmt::print(stderr, "interrupted before the first pass over the image: nothing is written\n");
+      return kInterrupted;
+    }
+    auto attributes = provenance(scene, settings, result.spp);
+    attributes.push_back({"limn.what", what_});
+    attributes.push_back({kOutputAttribute, output_name(output_)});
+    remove_stale(output_, {output_});
+    write_exr_layers(output_, result.layers, attributes);
+    if (!common_.quiet) {
+      fmt::print("layers   {}\n{} samples per pixel in {:.2f} s\n", output_, result.spp,
+                 result.seconds);
+    }
+    return finish_status(result.non_finite, result.spp, settings.spp, command_line);
+  }
   void check_options() const {
     check_image_options(*app_, {options_.method});
     refuse_samples(*app_, options_.points, {"--spp", "--part"}, options_);
@@ -118,7 +175,7 @@ class RenderCommand final : public Command {
   Warnings warnings_;
   RenderOptions options_;
   CLI::App* app_ = nullptr;
-  std::string output_, debug_;
+  std::string output_, debug_, what_ = kRenderWhat[0];
 };
 
 }  // namespace

@@ -53,18 +53,19 @@ def find_scenes(folder):
 
 
 def open_scene(limn, scene, defines, paths):
-    """The error message of `limn info`, "" where it opens the scene."""
+    """The error message of `limn info`, "" where it opens the scene; and the options for that."""
     values = dict(defines)
     while True:
-        command = [limn, "info", scene, "--quiet"]
+        options = []
         for name, value in values.items():
-            command += ["-D", f"{name}={value}"]
+            options += ["-D", f"{name}={value}"]
         for path in paths:
-            command += ["--path", path]
+            options += ["--path", path]
+        command = [limn, "info", scene, "--quiet", *options]
         try:
             done = subprocess.run(command, capture_output=True, text=True, timeout=SECONDS)
         except subprocess.TimeoutExpired:
-            return f"took more than {SECONDS} s"
+            return f"took more than {SECONDS} s", options
         errors = [line for line in done.stderr.splitlines() if "warning:" not in line]
         message = "\n".join(errors).strip()
         missing = UNDEFINED.search(message)
@@ -72,8 +73,8 @@ def open_scene(limn, scene, defines, paths):
             values[missing[1]] = VALUES.get(missing[1], "16")
             continue
         if done.returncode == 0:
-            return ""
-        return message or f"exit status {done.returncode}"
+            return "", options
+        return message or f"exit status {done.returncode}", options
 
 
 def reason_of(message):
@@ -94,7 +95,7 @@ def main():
     scenes = find_scenes(arguments.folder)
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
         messages = list(pool.map(
-            lambda scene: open_scene(limn, scene, defines, arguments.path), scenes))
+            lambda scene: open_scene(limn, scene, defines, arguments.path)[0], scenes))
     refused = [(scene, message) for scene, message in zip(scenes, messages) if message]
     reasons = collections.Counter(reason_of(message) for _, message in refused)
     print(f"{'scenes':>6}  reason")

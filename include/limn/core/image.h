@@ -27,6 +27,29 @@ struct Image {
   }
 };
 
+// An image as its file stores it: bytes where the file has eight bits (b means b / 255), else
+// floats. C is 1 or 3 interleaved channels, row 0 on top.
+struct StoredImage {
+  int width = 0;
+  int height = 0;
+  int channels = 3;
+  bool srgb = false;           // the numbers are encoded by sRGB's transfer function, not linear
+  std::vector<uint8_t> bytes;  // one of the two is empty
+  std::vector<float> floats;
+};
+// Reads EXR, PNG (8 and 16 bits), JPEG, RGBE (Radiance) or uncompressed BMP, told apart by their
+// first bytes, of at most kMaxPixels pixels. Alpha is dropped. Sizes in the header are checked
+// against the file's size before memory is allocated. InputError names the file.
+StoredImage read_stored_image(const std::string& file);
+// The same in linear floats.
+Image read_image(const std::string& file);
+// InputError at a pixel that is not finite. what: "the texture", for the message.
+void check_finite(const StoredImage& image, const std::string& file, const std::string& what);
+void check_finite(const Image& image, const std::string& file, const std::string& what);
+// The transfer function of sRGB, IEC 61966-2-1, and its inverse.
+double srgb_encode(double linear);
+double srgb_decode(double encoded);
+
 // Writes OpenEXR: scanline, ZIP; channels R G B for three channels, Y for one (no other number is
 // allowed). Attributes become string attributes of the header. Files are written under a
 // temporary name and renamed, so an interruption leaves no partial file. InputError names the

@@ -118,9 +118,15 @@ class DeltaLight : public Light {
   // a directional light.
   virtual double power() const = 0;
 
+  // The bitmap that multiplies what it sends, and that one's name; null if there is none.
+  virtual Texture* texture() const { return nullptr; }
+  virtual std::string texture_name() const { return ""; }
+  // The irradiance at p as a sum of its texels.
+  virtual TexelMap::TexelWeights texel_weights(const Vec3d& /*p*/) const { return {}; }
+
   virtual std::vector<ParameterRef> parameters() = 0;
-  virtual std::shared_ptr<DeltaLight> clone() const = 0;
-  virtual std::string describe() const = 0;  // one line for `limn info`
+  virtual std::shared_ptr<DeltaLight> clone() const = 0;  // with a texture of its own
+  virtual std::string describe() const = 0;               // one line for `limn info`
 
   std::optional<LightSample> sample(const Vec3d& p, double probability,
                                     const LightNumbers& u) const final;

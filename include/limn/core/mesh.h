@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -51,6 +52,8 @@ enum class UvSource : uint8_t {
   kDisk,    // place in the unit disk: distance from the center, azimuth over 2 pi
 };
 
+class MeshAttribute;  // mesh_attribute.h
+
 // A mesh in world space. Positions are floats, so Embree, shading and edges use identical
 // vertices.
 struct Mesh {
@@ -62,11 +65,14 @@ struct Mesh {
   std::vector<Vec3d> normals;           // N unit vectors; empty for kFace
   std::vector<FaceIndices> normal_ids;  // F by 3, into normals; empty for kFace
 
-  // Whether the shape's material reads textures. Where it does not, the next three are empty.
+  // Whether the shape's material or emitter reads textures. Where not, the next five are empty.
   bool textured = false;
   UvSource uv_source = UvSource::kNone;
   std::vector<Vec3f> uv_places;
   std::vector<FaceIndices> uv_ids;  // F by 3, into uv_places
+  // Those that textures read; shared by copies of a mesh, copied by deep_copy().
+  std::vector<std::shared_ptr<MeshAttribute>> attributes;
+  std::vector<uint32_t> file_faces;  // F: a face's index in the file; empty if its own
 
   // Whether the shape's material asks for tangents (tangent.h). Where it does not, the next three
   // are empty.

@@ -13,6 +13,7 @@
 #include "limn/core/error.h"
 #include "limn/core/film.h"
 #include "limn/core/mesh.h"
+#include "limn/core/texture.h"
 
 namespace limn {
 
@@ -28,8 +29,10 @@ struct Shape {
   Mesh mesh;
   std::shared_ptr<Bsdf> bsdf;  // never null; shared between shapes that refer to one element
   bool is_emitter = false;
-  Rgb<Dual> radiance;      // of an area emitter: emitted from the front of every face
-  std::string emitter_id;  // "" if none
+  // Of an area emitter: emitted from the front of every face; of a textured one the mean.
+  Rgb<Dual> radiance;
+  std::shared_ptr<Texture> radiance_texture;  // null if `radiance` is the same everywhere
+  std::string emitter_id;                     // "" if none
 };
 
 // The content of a <sensor> element.

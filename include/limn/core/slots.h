@@ -147,6 +147,14 @@ inline Rgb<Var> emitter_radiance<Var>(const Shape& shape, ShapeId id) {
   return {Var{c.r, nodes[0]}, Var{c.g, nodes[1]}, Var{c.b, nodes[2]}};
 }
 
+// Emitted radiance of a textured shape at the barycentric coordinates b, see SurfacePoint.
+template <class S>
+Rgb<S> textured_radiance(const Shape& shape, FaceId face, const std::array<S, 2>& b) {
+  return shape.radiance_texture->eval(texture_point<S>(shape.mesh, face, b));
+}
+template <>
+Rgb<Var> textured_radiance<Var>(const Shape& shape, FaceId face, const std::array<Var, 2>& b);
+
 }  // namespace detail
 
 }  // namespace limn

@@ -44,7 +44,9 @@ struct SurfacePoint {
   Rgb<S> emission(const Vec3d& wi, ShadingModel model) const {
     if (!shape->is_emitter) return {};
     const double side = model == ShadingModel::kMitsuba ? dot(value(n_s), wi) : dot(n_g, wi);
-    return side > 0 ? detail::emitter_radiance<S>(*shape, face.shape) : Rgb<S>{};
+    if (!(side > 0)) return {};
+    return shape->radiance_texture ? detail::textured_radiance<S>(*shape, face.face, b)
+                                   : detail::emitter_radiance<S>(*shape, face.shape);
   }
 };
 

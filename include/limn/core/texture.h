@@ -13,6 +13,7 @@
 
 namespace limn {
 
+class MeshAttribute;
 class Properties;
 
 // A point of a face of a textured mesh. S: double or Dual.
@@ -46,8 +47,17 @@ class Texture : public TexelMap {
     double least, most;
   };
   virtual Range range() const = 0;
+  // The range in which texels may move as parameters (at first [0, 1]).
+  void set_valid(const Range& valid) { valid_ = valid; }
+  const Range& valid() const { return valid_; }
   // Whether `eval` reads texture coordinates, not only barycentric ones.
   virtual bool needs_uv() const { return true; }
+  // The attribute of the mesh that it reads ("vertex_color"); "" if none. Its numbers count times
+  // `attribute_scale`.
+  virtual std::string attribute() const { return ""; }
+  virtual double attribute_scale() const { return 1; }
+  // What holds the texels of points of a mesh: this, or an attribute of the mesh.
+  virtual const TexelMap& texels_on(const Mesh& /*mesh*/) const { return *this; }
 
   // Whether it is the tangent of the surface (tangent.h), which no file names.
   virtual bool is_tangent() const { return false; }
@@ -75,6 +85,9 @@ class Texture : public TexelMap {
   }
   // Whether `eval` may jump at every edge of the mesh.
   virtual bool jumps_between_faces() const { return false; }
+  // Whether it also jumps at the borders of texels, which add_jumps does not list: derivatives with
+  // respect to what moves are then refused.
+  virtual bool jumps_between_texels() const { return false; }
   // Whether texture coordinates that differ by integers look up the same value.
   virtual bool has_period_one() const { return false; }
 
@@ -86,6 +99,7 @@ class Texture : public TexelMap {
 
  protected:
   bool of_numbers_ = false;
+  Range valid_{0, 1};
 
  private:
   bool mixes_channels_ = false;

@@ -1,0 +1,71 @@
+#!/usr/bin/env python3
+"""tools/mitsuba/regression.py on a folder that is made here, and, where MITSUBA_DATA names a clone of
+mitsuba-data, on its tests.
+
+    test_regression.py LIMN
+"""
+
+import os
+import subprocess
+import sys
+import tempfile
+import unittest
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+SCENE = """<scene version="3.0.0"><integrator type="path"/><sensor type="perspective">
+<film type="hdrfilm"><integer name="width" value="16"/><integer name="height" value="12"/>
+<string name="component_format" value="float32"/></film></sensor>
+<emitter type="constant"><rgb name="radiance" value="{}"/></emitter>{}</scene>"""
+LIMN = sys.argv.pop() if len(sys.argv) > 1 else None
+
+
+def regression(folder, *options):
+    tool = os.path.join(ROOT, "tools", "mitsuba", "regression.py")
+    return subprocess.run([sys.executable, tool, folder, "--limn", LIMN, *options],
+                          capture_output=True, text=True, check=False)
+
+
+class Regression(unittest.TestCase):
+    def setUp(self):
+        try:
+            import numpy  # noqa: F401
+        except ImportError:
+            self.skipTest("numpy is not installed")
+
+    def write(self, folder, name, radiance, reference, more=""):
+        """A scene, and references of another radiance and of a variance of 0.01."""
+        os.makedirs(os.path.join(folder, "refs"), exist_ok=True)
+        scene = os.path.join(folder, name + ".xml")
+        for value, file in ((reference, "_ref_rgb"), (0.01, "_ref_rgb_var")):
+            with open(scene, "w", encoding="utf-8") as stream:
+                stream.write(SCENE.format(value, ""))
+            subprocess.run([LIMN, "render", scene, "--quiet", "--spp", "1", "-o",
+                            os.path.join(folder, "refs", name + file + ".exr")], check=True)
+        with open(scene, "w", encoding="utf-8") as stream:
+            stream.write(SCENE.format(radiance, more))
+
+    def test_tells_right_from_wrong(self):
+        with tempfile.TemporaryDirectory() as folder:
+            self.write(folder, "right", 0.5, 0.5)
+            self.write(folder, "wrong", 0.5, 0.51)
+            self.write(folder, "unread", 0.5, 0.5, '<medium type="homogeneous"/>')
+            done = regression(folder, "--at-least", "1")
+            self.assertEqual(done.returncode, 0, done.stderr)
+            lines = {line.split()[0]: line for line in done.stdout.splitlines()}
+            self.assertTrue(lines["right.xml"].endswith("passes passes"), done.stdout)
+            self.assertTrue(lines["wrong.xml"].endswith("FAILS FAILS"), done.stdout)
+            self.assertIn("unknown element <medium>", lines["unread.xml"])
+            self.assertIn("1 pass both of 2 that open, of 3 with references", done.stdout)
+            self.assertEqual(regression(folder, "--at-least", "2").returncode, 1)
+
+    def test_mitsuba_data(self):
+        folder = os.environ.get("MITSUBA_DATA")
+        if not folder:
+            self.skipTest("MITSUBA_DATA names no clone of mitsuba-data")
+        done = regression(os.path.join(folder, "tests", "scenes"), "--only", "floating_sphere",
+                          "--at-least", "1")
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()

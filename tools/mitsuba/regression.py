@@ -1,0 +1,150 @@
+#!/usr/bin/env python3
+"""Holds limn's images against the reference images of Mitsuba's own regression tests.
+
+    tools/mitsuba/regression.py DIR [--only TEXT] [--path DIR] [-D name=value] [--at-least N]
+
+DIR is a clone of mitsuba-data, or a folder in it. A scene NAME.xml counts if refs/NAME_ref_rgb.exr
+and refs/NAME_ref_rgb_var.exr lie beside it: the image, and the variance of one sample. Scenes that
+limn does not open are listed with the reason.
+
+Two tests for each, of two million samples, by --shading mitsuba:
+
+- Mitsuba's (src/render/tests/test_renders.py): in XYZ, the probability of a difference as large,
+  from the reference's variance alone, is above 1 - 0.99^(1 / pixels) for 99.75 % of the values.
+- limn's: SEEDS images of their own seeds, and with their means by blocks of pixels a normal score
+  of the difference from the reference, both variances together. All blocks agree if a score as
+  large as the largest has a probability above 1e-4 among so many.
+
+With --at-least the exit status is 1 where fewer scenes pass both. Reading files that are neither
+plain nor zipped takes `pip install mitsuba==3.9.1`.
+"""
+
+import argparse
+import math
+import os
+import subprocess
+import sys
+import tempfile
+
+import numpy as np
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."))
+import census  # noqa: E402
+import common  # noqa: E402
+import exr  # noqa: E402
+
+SAMPLES = 2e6
+SEEDS = 8
+REFERENCE_SAMPLES = 32000
+XYZ = np.array([[0.412453, 0.357580, 0.180423], [0.212671, 0.715160, 0.072169],
+                [0.019334, 0.119193, 0.950227]])
+erfc = np.vectorize(math.erfc, otypes=[float])
+
+
+def read(file):
+    """H by W by 3."""
+    try:
+        channels = exr.read(file)
+        return np.stack([channels.get(name, channels.get("Y")) for name in "RGB"], -1)
+    except ValueError:
+        import mitsuba as mi
+        mi.set_variant("scalar_rgb")
+        return np.array(mi.Bitmap(file), dtype=np.float64)[..., :3]
+
+
+def references_of(scene):
+    """The reference and its variance; None where there are none."""
+    folder, name = os.path.split(scene)
+    stem = os.path.join(folder, "refs", name[:-len(".xml")] + "_ref_rgb")
+    files = [stem + ".exr", stem + "_var.exr"]
+    return [read(file) for file in files] if all(map(os.path.exists, files)) else None
+
+
+def images_of(limn, scene, options, spp):
+    """SEEDS by H by W by 3."""
+    images = []
+    with tempfile.TemporaryDirectory() as folder:
+        file = os.path.join(folder, "image.exr")
+        for seed in range(SEEDS):
+            command = [limn, "render", scene, "-o", file, "--spp", str(spp), "--seed", str(seed),
+                       "--generator", "independent", "--shading", "mitsuba", "--quiet", *options]
+            subprocess.run(command, check=True, stderr=subprocess.DEVNULL)
+            images.append(read(file))
+    return np.stack(images)
+
+
+def mitsuba_share(image, reference, variance, spp):
+    """The share of values that pass Mitsuba's test."""
+    image, reference, variance = (x @ XYZ.T for x in (image, reference, variance))
+    z = np.abs(image - reference) * np.sqrt(spp / np.maximum(variance, 1e-4))
+    pixels = z.shape[0] * z.shape[1]
+    return np.mean(erfc(z / math.sqrt(2)) > 1 - 0.99 ** (1 / pixels))
+
+
+def block_sums(values, block):
+    """... by H by W by 3 to ... by rows by columns by 3."""
+    rows = np.add.reduceat(values, range(0, values.shape[-3], block), axis=-3)
+    return np.add.reduceat(rows, range(0, values.shape[-2], block), axis=-2)
+
+
+def limn_score(images, reference, variance):
+    """The largest score of a block, and the probability of one as large among so many."""
+    block = max(1, -(-max(reference.shape[:2]) // 8))
+    sums = block_sums(images, block)
+    ours = sums.var(axis=0, ddof=1) / SEEDS
+    theirs = block_sums(variance, block) / REFERENCE_SAMPLES
+    # Images in halves: one rounding of each pixel.
+    rounding = block_sums((reference * 2.0**-11) ** 2, block) + 1e-20
+    total = ours + theirs + rounding
+    t = (sums.mean(axis=0) - block_sums(reference, block)) / np.sqrt(total)
+    # Welch's t, as a normal score of the same tail (Wallace 1959).
+    nu = np.minimum(total**2 * (SEEDS - 1) / np.maximum(ours**2, 1e-300), 1e6)
+    z = np.sqrt(nu * np.log1p(t * t / nu)) * (8 * nu + 1) / (8 * nu + 3)
+    largest = z.max()
+    p = -math.expm1(z.size * math.log1p(-min(1 - 1e-16, math.erfc(largest / math.sqrt(2)))))
+    return largest, p
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", metavar="DIR")
+    parser.add_argument("--only", default="", metavar="TEXT", help="scenes whose path contains this")
+    parser.add_argument("--path", action="append", default=[], metavar="DIR")
+    parser.add_argument("-D", dest="defines", action="append", default=[], metavar="NAME=VALUE")
+    parser.add_argument("--at-least", type=int, default=0, metavar="N")
+    parser.add_argument("--limn", metavar="PROGRAM", help="use this one (default: build/limn)")
+    arguments = parser.parse_args()
+    limn = common.find_limn(arguments.limn)
+    defines = [define.split("=", 1) for define in arguments.defines]
+    passed = tested = found = 0
+    print(f"{'scene':52} {'Mitsuba: share':>14} {'limn: max z':>12} {'p':>8}")
+    for scene in census.find_scenes(arguments.folder):
+        name = os.path.relpath(scene, arguments.folder)
+        references = references_of(scene) if arguments.only in name else None
+        if not references:
+            continue
+        found += 1
+        message, options = census.open_scene(limn, scene, defines, arguments.path)
+        if message:
+            print(f"{name:52} {census.reason_of(message)}", flush=True)
+            continue
+        tested += 1
+        reference, variance = references
+        spp = max(1, int(SAMPLES / reference[..., 0].size / SEEDS))
+        images = images_of(limn, scene, options, spp)
+        if images.shape[1:] != reference.shape:
+            print(f"{name:52} sizes differ: {images.shape[1:]} {reference.shape}", flush=True)
+            continue
+        share = mitsuba_share(images.mean(axis=0), reference, variance, SEEDS * spp)
+        largest, p = limn_score(images, reference, variance)
+        good = share >= 0.9975, p > 1e-4
+        passed += all(good)
+        words = " ".join("passes" if g else "FAILS" for g in good)
+        print(f"{name:52} {share:13.4%} {largest:12.2f} {p:8.2g}  {words}", flush=True)
+    print(f"{passed} pass both of {tested} that open, of {found} with references")
+    return 0 if passed >= arguments.at_least else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
