@@ -101,7 +101,9 @@ class LayerEstimator final : public SampleEstimator {
     for (size_t slot = 0; slot < types_.size(); ++slot) {
       const Rgb<double> value = types_[slot]->value(seen);
       if (is_finite(value)) {
-        sink.add(slot, sample.at, {{value.r}, {value.g}, {value.b}}, 1);
+        Rgb<Lanes> lanes;
+        for (int c = 0; c < 3; ++c) lanes[c][0] = value[c];
+        sink.add(slot, sample.at, lanes, 1);
       } else {
         sink.reject(sample.at, slot_name(slot));
       }

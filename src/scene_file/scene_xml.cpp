@@ -57,6 +57,8 @@ class SceneBuilder {
     if (object.tag == "integrator") {
       only_one(object, "integrator", integrator_);
       read_integrator(object, description_, scene_, warnings_);
+    } else if (object.tag == "sensor" && object.type == "batch") {
+      add_batch(object);
     } else if (object.tag == "sensor") {
       scene_.sensors.push_back(read_sensor(object, description_, warnings_));
     } else if (object.tag == "shape" && object.type == "shapegroup") {
@@ -80,6 +82,22 @@ class SceneBuilder {
   void note_data_file(const ObjectDescription& object) {
     DescribedProperties p(object, description_, make_nested_);
     if (p.has("filename")) scene_.data_files.push_back(p.file("filename"));
+  }
+
+  // Its sensors, one by one, with films of their own.
+  void add_batch(const ObjectDescription& object) {
+    DescribedProperties p(object, description_, make_nested_);
+    const std::vector<const ObjectDescription*> sensors = p.all_nested("sensor");
+    if (p.nested("film")) {
+      warnings_.push_back(format_warning(
+          object.where, "batch: its film is not used: every sensor has its own (--sensor)"));
+    }
+    p.nested("sampler");
+    p.check_all_used();
+    if (sensors.empty()) p.fail("needs sensors");
+    for (const ObjectDescription* sensor : sensors) {
+      scene_.sensors.push_back(read_sensor(*sensor, description_, warnings_));
+    }
   }
 
   static void only_one(const ObjectDescription& object, const std::string& what,
@@ -425,7 +443,11 @@ size_t count_sensors(const std::string& file, const std::map<std::string, std::s
                      const std::vector<std::string>& paths) {
   size_t count = 0;
   for (const auto& object : describe_scene(file, {defines, paths}, nullptr).objects) {
-    count += object->tag == "sensor" ? 1 : 0;
+    if (object->tag != "sensor") continue;
+    if (object->type != "batch") ++count;
+    for (const ChildDescription& child : object->children) {
+      count += child.object->tag == "sensor" ? 1 : 0;
+    }
   }
   return count;
 }

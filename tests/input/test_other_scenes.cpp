@@ -206,6 +206,24 @@ TEST(OtherScenes, InstancesAreCopies) {
             std::string::npos);
 }
 
+TEST(OtherScenes, BatchesAreLists) {
+  const std::string sensor =
+      "<sensor type=\"perspective\"><film type=\"hdrfilm\"><integer "
+      "name=\"width\" value=\"7\"/></film></sensor>";
+  const TempFiles files;
+  const std::string file = files.write(
+      "s.xml", "<scene version=\"3.0.0\"><sensor type=\"batch\"><film type=\"hdrfilm\"/>" + sensor +
+                   sensor + "</sensor>" + sensor + "</scene>");
+  std::vector<std::string> warnings;
+  const Scene scene = read_scene(file, {}, &warnings);
+  ASSERT_EQ(scene.sensors.size(), 3u);
+  EXPECT_EQ(scene.sensors[1].camera.width, 7);
+  EXPECT_EQ(count_sensors(file, {}), 3u);
+  EXPECT_EQ(warnings.size(), 1u);
+  EXPECT_NE(message_of("<sensor type=\"batch\"/>").find("sensor \"batch\": needs sensors"),
+            std::string::npos);
+}
+
 // The film is [-1, 1] across and square pixels high, scaled by to_world.
 TEST(OtherScenes, OrthographicSensors) {
   const Scene scene = read_scene_text(
