@@ -40,6 +40,21 @@ void leave_out_copies(std::vector<Texture::Jump>& jumps) {
   jumps = std::move(kept);
 }
 
+// Attributes of vertices jump at most where these are stored more than once.
+void mark_copies(const Mesh& mesh, TextureSeams& seams) {
+  std::vector<uint8_t> has_copies(mesh.positions.size());
+  for (uint32_t v = 0; v < mesh.weld.size(); ++v) {
+    if (mesh.weld[v] != v) has_copies[mesh.weld[v]] = 1;
+  }
+  seams.sides.resize(mesh.faces.size());
+  for (size_t f = 0; f < mesh.faces.size(); ++f) {
+    for (int k = 0; k < 3; ++k) {
+      const uint32_t a = mesh.faces[f][k], b = mesh.faces[f][(k + 1) % 3];
+      if (has_copies[mesh.weld[a]] || has_copies[mesh.weld[b]]) seams.sides[f] |= 1 << k;
+    }
+  }
+}
+
 }  // namespace
 
 TextureJumps::TextureJumps(const Scene& scene) {
@@ -58,12 +73,15 @@ void TextureJumps::look_at(const Scene& scene, ShapeId id) {
   seams.period_one = true;
   for (const Texture* texture : textures_of(shape)) {
     seams.everywhere = seams.everywhere || texture->jumps_between_faces();
-    if (!texture->needs_uv()) continue;
+    if (!texture->needs_uv()) {
+      mark_copies(mesh, seams);
+      continue;
+    }
     textures.push_back(texture);
     seams.coordinates = true;
     seams.period_one = seams.period_one && texture->has_period_one();
   }
-  result.has_seams = seams.everywhere || seams.coordinates;
+  result.has_seams = seams.everywhere || seams.coordinates || !seams.sides.empty();
   if (textures.empty()) return;
   if (mesh.uv_source != UvSource::kPlane && !seams.period_one) with_meridian_.push_back(id);
   seams.sides.resize(mesh.faces.size());
@@ -88,7 +106,7 @@ bool TextureJumps::add_face(const std::vector<const Texture*>& textures, const M
     of_one += jumps.inside.size() > before;
   }
   if (of_one > 1) leave_out_copies(jumps.inside);
-  result.seams.sides[face.index()] = jumps.sides;
+  result.seams.sides[face.index()] |= jumps.sides;
   for (const Texture::Jump& jump : jumps.inside) {
     result.segments.push_back({face, jump.from, jump.to});
   }

@@ -17,6 +17,7 @@
 #include "support/chi_square.h"
 #include "support/forest_fault.h"
 #include "support/meshes.h"
+#include "support/same_mean.h"
 #include "support/scenes.h"
 #include "support/test_properties.h"
 
@@ -352,6 +353,22 @@ TEST(TextureEdges, DerivativesAgreeWithDifferences) {
   for (const char* name : {"board.translate.x", "can.rotate.y", "can.scale", "floor.translate.y",
                            "sensor.translate.x", "sensor.fov"})
     expect_agreement(scene, name, 256);
+}
+
+// Where regions of light are apart, no list of outlines has the edges inside of a lamp.
+TEST(TextureEdges, OfLampsCountWithRegionsApart) {
+  const TempFiles files;
+  SceneParts parts;
+  parts.max_depth = 2;
+  parts.body =
+      square("floor", 2, -90, {0, 0, 0}, diffuse("grey", ".5, .5, .5")) +
+      square("lamp", 0.8, 90, {0.2, 1.5, 0},
+             R"(<emitter type="area" id="glow"><texture type="checkerboard" name="radiance">
+                      <rgb name="color0" value="1, .8, .6"/><rgb name="color1" value="0, .1, .2"/>
+                      </texture></emitter>)");
+  const Scene scene = make_scene(files, parts);
+  expect_same_mean(scene, {"lamp.translate.x", "lamp.rotate.y"}, {"silhouettes", "adaptive"}, 512);
+  expect_agreement(scene, "lamp.translate.x", 512);
 }
 
 TEST(TextureEdges, TooManyAndMeridiansAreTold) {

@@ -1,5 +1,7 @@
-"""Writes the closed-form scenes as Mitsuba 3 XML with OBJ meshes."""
+"""Writes the closed-form scenes as Mitsuba 3 XML with OBJ meshes and PNG textures."""
 import os
+import struct
+import zlib
 
 import numpy as np
 
@@ -41,6 +43,28 @@ def obj_text(shape):
     return "\n".join(lines) + "\n"
 
 
+def write_png(texels, path):
+    """8-bit rgb: height by width by 3."""
+    height, width = texels.shape[:2]
+    rows = b"".join(b"\0" + row.astype(np.uint8).tobytes() for row in texels)
+    chunks = [(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)),
+              (b"IDAT", zlib.compress(rows)), (b"IEND", b"")]
+    with open(path, "wb") as out:
+        out.write(b"\x89PNG\r\n\x1a\n")
+        for kind, data in chunks:
+            out.write(struct.pack(">I", len(data)) + kind + data
+                      + struct.pack(">I", zlib.crc32(kind + data)))
+
+
+def emitter_xml(shape, texture_file):
+    if shape.texels is None:
+        return (f'    <emitter type="area" id="{shape.emitter_id}">'
+                f'{rgb("radiance", shape.radiance)}</emitter>\n')
+    return (f'    <emitter type="area" id="{shape.emitter_id}"><texture name="radiance" type="bitmap">\n'
+            f'      <string name="filename" value="{texture_file}"/><boolean name="raw" value="true"/>'
+            f'</texture></emitter>\n')
+
+
 def bsdf_xml(bsdf):
     if bsdf.colors is not None:
         colors = "".join(rgb(f"color{k}", color) for k, color in enumerate(bsdf.colors))
@@ -66,9 +90,8 @@ def shape_xml(name, shape, mesh_file):
         head = (f'  <shape type="rectangle" id="{name}">\n    <transform name="to_world">'
                 f'<scale value="8"/><rotate x="1" angle="-90"/></transform>\n')
     body = f'    <ref id="{shape.bsdf.id}"/>\n' if shape.bsdf else ""
-    if shape.radiance is not None:
-        body += (f'    <emitter type="area" id="{shape.emitter_id}">'
-                 f'{rgb("radiance", shape.radiance)}</emitter>\n')
+    if shape.emitter_id:
+        body += emitter_xml(shape, mesh_file.replace(".obj", ".png"))
     return head + body + "  </shape>\n"
 
 
@@ -127,6 +150,8 @@ def write_scene(scene, folder, moved=False):
         if mesh_file:
             with open(os.path.join(folder, mesh_file), "w") as out:
                 out.write(obj_text(shape))
+            if shape.texels is not None:
+                write_png(shape.texels, os.path.join(folder, mesh_file.replace(".obj", ".png")))
         text += shape_xml(name, shape, mesh_file)
     if scene.environment is not None:
         text += (f'  <emitter type="constant" id="environment">'

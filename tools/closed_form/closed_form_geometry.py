@@ -22,6 +22,7 @@ class Shape:
     face_normals: bool = True
     hole: list = field(default_factory=list)  # loops that would close an open convex mesh
     uv: list = None  # texture coordinates: for every face K by 2, affine over it
+    texels: np.ndarray = None  # 2 by 2 by 3 [row, column], of 255: radiance, bilinear between them
 
     def face(self, k):
         return self.vertices[self.faces[k]]
@@ -259,6 +260,16 @@ def squares(shape, k):
                 found.append((np.column_stack([part, np.ones(len(part))]) @ to_space,
                               0 if i % 2 == j % 2 else 1))
     return found
+
+
+def ramp(shape, x):
+    """The radiance of a lamp with texels at points x (N by 3) of face 0: uv in [1/4, 3/4]^2."""
+    loop, uv = shape.face(0), np.asarray(shape.uv[0], dtype=float)
+    along = np.stack([loop[1] - loop[0], loop[3] - loop[0]], axis=1)
+    st = np.linalg.lstsq(along, (x - loop[0]).T, rcond=None)[0].T
+    u, v = (2 * (uv[0] + st @ np.stack([uv[1] - uv[0], uv[3] - uv[0]])) - 0.5).T[:, :, None]
+    t = shape.texels / 255
+    return (1 - v) * ((1 - u) * t[0, 0] + u * t[0, 1]) + v * ((1 - u) * t[1, 0] + u * t[1, 1])
 
 
 def clip_convex(polygon, clipper):

@@ -12,7 +12,7 @@ All three moved together give the picture of the moved scene, so the terms add u
 import numpy as np
 
 from closed_form_geometry import (clip, clip_box, clip_convex, hit_plane, loop_normal, loop_rule,
-                                  shadow_on_plane, square_rule, squares, unit)
+                                  ramp, shadow_on_plane, square_rule, squares, unit)
 from closed_form_radiance import (Filter, convex_vector, lobe, lobe_over_polygon, polygon_area,
                                   polygon_vector)
 
@@ -171,6 +171,40 @@ class WedgeInGloss(FloorModel):
 
         return lobe_over_polygon(p, floor_normal(shade), viewer, shade.shapes["floor"].bsdf, lit,
                                  4 * order, reflected)
+
+
+class RampOnFloor(FloorModel):
+    """A lamp whose radiance is bilinear over its face, over a diffuse floor.
+
+    Directions from the floor are points of the plane of the lamp at rest as seen from the point of
+    the floor at rest: the lamp's outline there, and what the lamp sends in these directions.
+    """
+
+    def image(self, domain, shade, outline, shadow, order):
+        nodes, weights = square_rule(order)
+
+        def mean(corner):
+            film = nodes + corner
+            p = [hit_plane(s.camera, film, s.shapes["floor"].face(0))
+                 for s in (domain, shade, outline)]
+            return sum(weight * self.radiance_at(shade, outline, domain, [q[k] for q in p], order)
+                       for k, weight in enumerate(weights))
+
+        return pixels(domain.camera, mean)
+
+    def radiance_at(self, shade, outline, rest, p, order):
+        chart = rest.shapes["lamp"].face(0)
+        loop = on_chart(outline.shapes["lamp"].face(0), p[2], chart, p[0])
+        parts = [loop_rule(loop[[0, k, k + 1]], 2 * order) for k in (1, 2)]
+        node, area = (np.concatenate(values) for values in zip(*parts))
+        w = node - p[0]
+        r = np.linalg.norm(w, axis=1)
+        omega = w / r[:, None]
+        lamp = shade.shapes["lamp"]
+        normal = loop_normal(lamp.face(0))
+        x = p[1] + omega * ((lamp.face(0)[0] - p[1]) @ normal / (omega @ normal))[:, None]
+        f = lobe(shade.shapes["floor"].bsdf, floor_normal(shade), None, omega)
+        return (area * -(w @ loop_normal(chart)) / r**3) @ (f * ramp(lamp, x))
 
 
 class BoardInGloss(FloorModel):

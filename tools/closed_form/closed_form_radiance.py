@@ -53,11 +53,12 @@ def smith_g1(kind, alpha, cosine):
 
 def lobe(bsdf, n, to_viewer, omega):
     """f_s [1/sr] = BSDF times n.omega, per channel: M by 3. Directions M by 3 (or broadcast)."""
-    cos_i = np.sum(n * to_viewer, axis=-1)
     cos_o = np.sum(n * omega, axis=-1)
-    assert np.all(cos_i > 0) and np.all(cos_o > 0), "below the horizon"
+    assert np.all(cos_o > 0), "below the horizon"
     if bsdf.kind == "diffuse":
         return cos_o[..., None] * bsdf.reflectance / np.pi
+    cos_i = np.sum(n * to_viewer, axis=-1)
+    assert np.all(cos_i > 0), "below the horizon"
     h = unit(to_viewer + omega)
     c2 = np.sum(n * h, axis=-1) ** 2
     a2 = bsdf.alpha**2

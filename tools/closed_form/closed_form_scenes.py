@@ -309,6 +309,17 @@ def board_in_gloss():
     return scene, models.BoardInGloss(), names
 
 
+def textured_lamp():
+    shape = parallelogram((-1, 2, -0.5), (1, 0.25, 0), (0, 0.125, 1))
+    shape.emitter_id = "lamp_emitter"
+    shape.uv = [vector(0.25, 0.25, 0.75, 0.25, 0.75, 0.75, 0.25, 0.75).reshape(4, 2)]
+    shape.texels = vector(255, 0, 64, 32, 255, 0, 0, 128, 255, 128, 16, 0).reshape(2, 2, 3)
+    scene = Scene("textured_lamp.xml", floor_camera((1, 1)), {"floor": floor(), "lamp": shape}, 2)
+    names = ["lamp.translate.x", "lamp.translate.y", "lamp.rotate.y", "lamp.rotate.z", "lamp.scale",
+             "floor.translate.y", "floor.rotate.x", "sensor.translate.x", "floor_bsdf.reflectance"]
+    return scene, models.RampOnFloor(), names
+
+
 SCENES = {
     "convex_over_plane": convex_over_plane,
     "lamp_over_plane": lamp_over_plane,
@@ -339,4 +350,5 @@ SCENES = {
     "board_in_sky": board_in_sky,
     "seam_in_sky": seam_in_sky,
     "board_in_gloss": board_in_gloss,
+    "textured_lamp": textured_lamp,
 }
