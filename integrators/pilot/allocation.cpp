@@ -148,19 +148,24 @@ Totals totals_of_cells(const std::vector<TermFigures>& terms, const std::vector<
   return totals;
 }
 
-// The count of a term of the film with the least product beside `others`, which costs no more than
-// is left of `most`: the fewest if none is that cheap.
+// The count of a term of the film beside `others`: the smallest whose product is close to the least
+// (kRounding), among those that cost no more than is left of `most`; the fewest if none is that
+// cheap.
 double best_on_film(const TermFigures& term, const Totals& others, double most) {
-  const auto product = [&](double n) {
-    return (others.error + term.variance / n) * (others.cost + term.cost_of(n));
-  };
-  double best = term.least;
-  if (!(term.variance > 0)) return best;
+  if (!(term.variance > 0)) return term.least;
+  std::vector<double> counts, products;
   for (double n = term.least; n <= kMostInPixel; n *= std::pow(2.0, 0.25)) {
-    if (others.cost + term.cost_of(n) > most) break;
-    if (product(n) < product(best)) best = n;
+    const double cost = others.cost + term.cost_of(n);
+    if (cost > most) break;
+    counts.push_back(n);
+    products.push_back((others.error + term.variance / n) * cost);
   }
-  return best;
+  if (counts.empty()) return term.least;
+  const double enough = kRounding * *std::min_element(products.begin(), products.end());
+  for (size_t i = 0; i < counts.size(); ++i) {
+    if (products[i] <= enough) return counts[i];
+  }
+  return counts.back();
 }
 
 ScaledPlan plan_at(const std::vector<TermFigures>& terms, const std::vector<Wish>& wishes,
