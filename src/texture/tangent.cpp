@@ -250,6 +250,7 @@ void update_u_tangents(Mesh& mesh) {
 
 void pull_back_u_directions(const Mesh& mesh, const std::vector<Vec3d>& directions,
                             std::vector<Vec3d>& positions) {
+  if (!mesh.has_tangents) return;
   for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
     const FaceIndices& ids = mesh.u_ids[f];
     const auto is_zero = [&](uint32_t id) { return directions[id] == Vec3d{}; };

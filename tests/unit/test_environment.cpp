@@ -225,7 +225,8 @@ TEST(Environment, BadInputIsExplained) {
   Image image(4, 3, 3);
   write_exr(file, image, false, {});
   expect_error(
-      "unknown emitter type \"sunsky\" (known: constant, directional, envmap, point, spot)",
+      "unknown emitter type \"sunsky\" (known: constant, directional, envmap, point, "
+      "projector, spot)",
       {"emitter", "sunsky"});
   expect_error("must be finite", {"emitter", "constant", {{"radiance", INFINITY}}});
   Matrix4 sheared;

@@ -96,6 +96,7 @@ struct MeshScene {
   explicit MeshScene(const Mesh& mesh) {
     Shape shape;
     shape.mesh = mesh;
+    shape.bsdf = make_diffuse(grey(0.5));
     scene.shapes.push_back(shape);
     slots.scene = &scene;
     const auto v = static_cast<uint32_t>(mesh.positions.size());
