@@ -79,13 +79,23 @@ class BoundaryTerm final : public Term {
     const Shape& shape = context_.scene.shape(mesh.shape);
     return shape.is_emitter && shape.mesh.textured;
   }
-  // Lists of outlines before regions have no edges at which the texture of a region's own light
-  // jumps: there all radiance counts.
-  EdgeDraw drawn_at(const PathVertex& vertex, const EdgeSample& sample, const Rng& key) const {
+  // What a point on an edge adds, but for what regions emit: lists of outlines have that. They have
+  // no edges inside a textured emitter, so what its texture emits on either side is added here, in
+  // directions that are held, see path.h.
+  void add_drawn(const PathVertex& vertex, const EdgeSample& sample, const Rng& key, bool roulette,
+                 BoundarySink& sink) const {
     const EdgeMesh& mesh = edges_.object(sample.edge.object);
-    const bool inside = emitters_jump_ && is_textured_emitter(mesh) &&
-                        !is_outline(mesh, sample.edge.edge, vertex.surface.p);
-    return {mesh, sample, inside ? RadiancePart{} : part_, key};
+    EdgeDraw draw{mesh, sample, part_, key};
+    draw.roulette = roulette;
+    add_edge_point(context_, vertex, draw, sink);
+    if (!emitters_jump_ || !part_.regions || !is_textured_emitter(mesh)) return;
+    if (is_outline(mesh, sample.edge.edge, vertex.surface.p)) return;
+    for (size_t k = 0; k < part_.regions->size(); ++k) {
+      if (part_.regions->shape(k) != mesh.shape) continue;
+      draw.part.region = k;
+      draw.held = true;
+      add_edge_point(context_, vertex, draw, sink);
+    }
   }
 
   const PathContext& context_;
@@ -112,7 +122,7 @@ void BoundaryTerm::add_before_glare(const PathVertex& vertex, const EdgeQuery& q
   glare_->draw(view, query, key.at(Purpose::kDirect, vertex.bounces), samples, sink.cost(), points);
   for (size_t i = 0; i < points.size(); ++i) {
     const Rng own = key.copy(Purpose::kEdgeCopy, static_cast<int>(i));
-    add_edge_point(context_, vertex, drawn_at(vertex, points[i].sample, own), sink);
+    add_drawn(vertex, points[i].sample, own, false, sink);
   }
 }
 
@@ -130,9 +140,7 @@ void BoundaryTerm::add_draws(const PathVertex& vertex, const EdgeQuery& query, i
       ++cost.zero_weight;
       if (sink.log()) sink.log()->push_back("  edge: before glare, left to others");
     } else {
-      EdgeDraw draw = drawn_at(vertex, *drawn[i], vertex.key.copy(Purpose::kEdgeCopy, i));
-      draw.roulette = true;
-      add_edge_point(context_, vertex, draw, sink);
+      add_drawn(vertex, *drawn[i], vertex.key.copy(Purpose::kEdgeCopy, i), true, sink);
     }
   }
 }
