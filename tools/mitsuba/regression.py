@@ -3,9 +3,9 @@
 
     tools/mitsuba/regression.py DIR [--only TEXT] [--path DIR] [-D name=value] [--at-least N]
 
-DIR is a clone of mitsuba-data, or a folder in it. A scene NAME.xml counts if refs/NAME_ref_rgb.exr
-and refs/NAME_ref_rgb_var.exr lie beside it: the image, and the variance of one sample. Scenes that
-limn does not open are listed with the reason.
+DIR is a clone of mitsuba-data, or a folder in it. A scene NAME.xml or NAME_INTEGRATOR.xml counts if
+refs/NAME_ref_rgb.exr and refs/NAME_ref_rgb_var.exr lie beside it: the image, and the variance of
+one sample. Scenes that limn does not open are listed with the reason.
 
 Two tests for each, of two million samples, by --shading mitsuba:
 
@@ -55,9 +55,13 @@ def read(file):
 def references_of(scene):
     """The reference and its variance; None where there are none."""
     folder, name = os.path.split(scene)
-    stem = os.path.join(folder, "refs", name[:-len(".xml")] + "_ref_rgb")
-    files = [stem + ".exr", stem + "_var.exr"]
-    return [read(file) for file in files] if all(map(os.path.exists, files)) else None
+    name = name[:-len(".xml")]
+    for stem in (name, name.rpartition("_")[0]):
+        stem = os.path.join(folder, "refs", stem + "_ref_rgb")
+        files = [stem + ".exr", stem + "_var.exr"]
+        if all(map(os.path.exists, files)):
+            return [read(file) for file in files]
+    return None
 
 
 def images_of(limn, scene, options, spp):
@@ -92,7 +96,8 @@ def limn_score(images, reference, variance):
     block = max(1, -(-max(reference.shape[:2]) // 8))
     sums = block_sums(images, block)
     ours = sums.var(axis=0, ddof=1) / SEEDS
-    theirs = block_sums(variance, block) / REFERENCE_SAMPLES
+    # Variances as differences of squares may come out below zero.
+    theirs = block_sums(np.maximum(variance, 0), block) / REFERENCE_SAMPLES
     # Images in halves: one rounding of each pixel.
     rounding = block_sums((reference * 2.0**-11) ** 2, block) + 1e-20
     total = ours + theirs + rounding
