@@ -149,23 +149,18 @@ Totals totals_of_cells(const std::vector<TermFigures>& terms, const std::vector<
 }
 
 // The count of a term of the film beside `others`: the smallest whose product is close to the least
-// (kRounding), among those that cost no more than is left of `most`; the fewest if none is that
+// (kRounding), or the largest that costs no more than is left of `most`; the fewest if none is that
 // cheap.
 double best_on_film(const TermFigures& term, const Totals& others, double most) {
   if (!(term.variance > 0)) return term.least;
-  std::vector<double> counts, products;
-  for (double n = term.least; n <= kMostInPixel; n *= std::pow(2.0, 0.25)) {
-    const double cost = others.cost + term.cost_of(n);
-    if (cost > most) break;
-    counts.push_back(n);
-    products.push_back((others.error + term.variance / n) * cost);
-  }
-  if (counts.empty()) return term.least;
-  const double enough = kRounding * *std::min_element(products.begin(), products.end());
-  for (size_t i = 0; i < counts.size(); ++i) {
-    if (products[i] <= enough) return counts[i];
-  }
-  return counts.back();
+  constexpr double kStep = 1.189207115002721;  // the fourth root of 2
+  const auto cost = [&](double n) { return others.cost + term.cost_of(n); };
+  const auto product = [&](double n) { return (others.error + term.variance / n) * cost(n); };
+  double least = std::numeric_limits<double>::infinity();
+  for (double n = term.least; n <= kMostInPixel; n *= kStep) least = std::min(least, product(n));
+  double n = term.least;
+  while (product(n) > kRounding * least && cost(n * kStep) <= most) n *= kStep;
+  return n;
 }
 
 ScaledPlan plan_at(const std::vector<TermFigures>& terms, const std::vector<Wish>& wishes,

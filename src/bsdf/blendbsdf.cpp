@@ -149,7 +149,7 @@ class Blend final : public NestingBsdf {
 }  // namespace
 
 std::shared_ptr<Bsdf> read_blendbsdf(Properties& properties) {
-  auto texture = properties.texture("weight");
+  auto texture = read_texture(properties, "weight", 1);
   if (!texture && !properties.has("weight")) properties.fail("needs a weight");
   const ConstantOrTexture weight =
       texture ? ConstantOrTexture(texture)

@@ -97,7 +97,7 @@ class Mask final : public NestingBsdf {
 
 // A texture or a number in [0, 1].
 ConstantOrTexture read_opacity(Properties& properties) {
-  if (auto texture = properties.texture("opacity")) return texture;
+  if (auto texture = read_texture(properties, "opacity", 1)) return texture;
   const double opacity = properties.number("opacity", 0.5);
   return std::clamp(opacity, 0.0, 1.0);
 }

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 
+#include "src/bsdf/types.h"
+
 namespace limn::principled {
 namespace {
 
@@ -49,7 +51,7 @@ double bound_of_base(double color, double roughness, double sheen, double sheen_
 
 ConstantOrTexture read_number(Properties& properties, const char* name, double absent,
                               double most) {
-  if (auto texture = properties.texture(name)) return texture;
+  if (auto texture = read_texture(properties, name, most)) return texture;
   const double number = properties.number(name, absent);
   if (!(number >= 0 && number <= most)) {
     properties.fail(name, fmt::format("must lie in [0, {:g}]", most));

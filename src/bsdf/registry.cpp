@@ -1,4 +1,6 @@
 // The table of BSDF types.
+#include <fmt/format.h>
+
 #include "limn/core/names.h"
 #include "src/bsdf/types.h"
 
@@ -49,11 +51,16 @@ std::shared_ptr<Bsdf> make_bsdf(Properties& properties) {
                    unknown_name("bsdf type", properties.type(), names_of(kTypes)));
 }
 
-ConstantOrTexture read_reflectance(Properties& properties, const char* name, double absent) {
-  if (auto texture = properties.texture(name)) {
-    if (texture->range().least >= 0 && texture->range().most <= 1) return texture;
-    properties.fail(name, "the values of the texture must lie in [0, 1]");
+std::shared_ptr<Texture> read_texture(Properties& properties, const char* name, double most) {
+  std::shared_ptr<Texture> texture = properties.texture(name);
+  if (texture && !(texture->range().least >= 0 && texture->range().most <= most)) {
+    properties.fail(name, fmt::format("the values of the texture must lie in [0, {:g}]", most));
   }
+  return texture;
+}
+
+ConstantOrTexture read_reflectance(Properties& properties, const char* name, double absent) {
+  if (auto texture = read_texture(properties, name, 1)) return texture;
   const Rgb<double> c = properties.rgb(name, grey(absent));
   for (int i = 0; i < 3; ++i) {
     if (!(c[i] >= 0 && c[i] <= 1)) properties.fail(name, "a reflectance must lie in [0, 1]");

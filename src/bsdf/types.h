@@ -38,6 +38,8 @@ std::shared_ptr<Bsdf> make_roughdielectric(const RoughDielectricValues& values);
 ConstantOrTexture read_alpha(Properties& properties);
 RoughConductorValues::Distribution read_distribution(Properties& properties);
 
+// The texture of this name, whose values must lie in [0, most]; null if there is none.
+std::shared_ptr<Texture> read_texture(Properties& properties, const char* name, double most);
 // Reads a colour whose channels lie in [0, 1], as Mitsuba requires of reflectances, or a texture.
 ConstantOrTexture read_reflectance(Properties& properties, const char* name, double absent);
 

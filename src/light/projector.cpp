@@ -112,13 +112,16 @@ class Projector final : public DeltaLight {
 
 // Tangents of half the field of view. aspect: width over height of the frame.
 HalfFrame read_half_frame(Properties& p, double aspect) {
-  const std::string axis = lower_case(p.string("fov_axis", "x"));
+  std::string axis = lower_case(p.string("fov_axis", "x"));
   static const std::vector<std::string> kAxes = {"diagonal", "larger", "smaller", "x", "y"};
   if (std::find(kAxes.begin(), kAxes.end(), axis) == kAxes.end()) {
     p.fail("fov_axis", unknown_name("axis", axis, kAxes));
   }
-  if (!p.has("fov")) p.fail("parameter \"fov\" is missing");
-  const double fov = p.number("fov", 0);
+  // Without fov that of a lens of 50 mm before a film of 36 by 24 mm, along its diagonal, as
+  // Mitsuba has it.
+  if (!p.has("fov")) axis = "diagonal";
+  const double of_lens = 2 * std::atan(std::hypot(36.0, 24.0) / 100) * (180 / kPi);
+  const double fov = p.number("fov", of_lens);
   if (!(fov > 0 && fov < 180)) p.fail("fov", "must lie between 0 and 180 degrees");
   double x = std::tan(fov * (kPi / 360));
   if (axis == "diagonal") x *= aspect / std::hypot(1, aspect);

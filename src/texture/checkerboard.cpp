@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "src/texture/types.h"
 
@@ -47,8 +48,10 @@ class Checkerboard final : public Texture {
   }
   bool has_period_one() const override { return to_uv_.keeps_integers(); }
   std::vector<ParameterRef> parameters() override {
-    const auto ref = [](const char* name, Rgb<Dual>& c) {
-      return ParameterRef{name, {&c.r, &c.g, &c.b}, ParameterRef::Unit::kValue, 0, 1};
+    const auto ref = [this](const char* name, Rgb<Dual>& c) {
+      // Colours above 1 are those of a lamp.
+      const double most = range().most > 1 ? std::numeric_limits<float>::max() : 1;
+      return ParameterRef{name, {&c.r, &c.g, &c.b}, ParameterRef::Unit::kValue, 0, most};
     };
     // For numbers, the colours' places are exchanged.
     return {ref("color0", colors_[of_numbers_ ? 1 : 0]),
@@ -111,7 +114,7 @@ Rgb<double> read_color(Properties& properties, const char* name, double absent) 
   }
   const Rgb<double> c = properties.rgb(name, grey(absent));
   for (int i = 0; i < 3; ++i) {
-    if (!(c[i] >= 0 && c[i] <= 1)) properties.fail(name, "a colour must lie in [0, 1]");
+    if (!(c[i] >= 0)) properties.fail(name, "a colour must not be negative");
   }
   return c;
 }

@@ -186,7 +186,7 @@ TEST(SpreadSamples, CostNoMoreThanTheyMay) {
     return cost;
   };
   const double free = cost_of(kNoLimit), least = 3 + 10 * 0.125 + 0.125;
-  ASSERT_GT(free, 3 * least);
+  ASSERT_GT(free, 2.5 * least);  // so that there is something to save
   EXPECT_DOUBLE_EQ(cost_of(1.001 * free), free);
   for (const double most : {0.9 * free, 0.5 * free, 1.5 * least}) {
     EXPECT_LE(cost_of(most), most * (1 + 1e-6));
@@ -214,8 +214,7 @@ TEST(SpreadSamples, KnowTermsOfTheFilm) {
       }
       SamplePlan plan;
       spread_samples(figures, grid, plan);
-      EXPECT_LE(product(plan.counts[0][0], plan.uniform[1]), 1.3 * least)
-          << of_path << " " << cost;
+      EXPECT_LE(product(plan.counts[0][0], plan.uniform[1]), 1.3 * least) << of_path << " " << cost;
     }
   }
 }

@@ -15,9 +15,9 @@ class ShadingNormalsAdjoint {
   ShadingNormalsAdjoint(ShadingNormalsAdjoint&&) noexcept;
   ~ShadingNormalsAdjoint();
 
-  // Adds to `positions` (V) the derivatives of a scalar with respect to positions, at the first copy
-  // of each welded vertex, from those with respect to normals (N). Normals of a file or of faces
-  // add nothing. Skips zero derivatives, so the cost is linear in the nonzero ones.
+  // Adds to `positions` (V) the derivatives of a scalar with respect to positions, at the first
+  // copy of each welded vertex, from those with respect to normals (N). Normals of a file or of
+  // faces add nothing. Skips zero derivatives, so the cost is linear in the nonzero ones.
   void pull_back(const std::vector<Vec3d>& normals, std::vector<Vec3d>& positions) const;
 
  private:
