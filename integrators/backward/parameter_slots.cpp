@@ -194,7 +194,8 @@ void ParameterSlots::add_shapes(const Scene& scene) {
   }
 }
 
-void ParameterSlots::add_values(const Scene& scene) {
+// The slot of every value of the scene; 0 for those that no parameter moves.
+std::vector<uint32_t> ParameterSlots::take_values(const Scene& scene) {
   // Meshes are no part of what is looked at.
   Scene hull = deep_copy(scene);
   for (Shape& shape : hull.shapes) shape.mesh = {};
@@ -221,6 +222,11 @@ void ParameterSlots::add_values(const Scene& scene) {
     }
   }
   free_.camera = slots_.camera != 0;
+  return slot_of;
+}
+
+void ParameterSlots::add_values(const Scene& scene) {
+  const std::vector<uint32_t> slot_of = take_values(scene);
   size_t next = kCameraSlots;
   const auto slots_of = [&](auto& object) {
     std::vector<ChannelSlots> slots;

@@ -65,6 +65,7 @@ class ParameterSlots {
 
   uint32_t take(uint32_t count, double unit = 1);
   void add_shapes(const Scene& scene);
+  std::vector<uint32_t> take_values(const Scene& scene);
   void add_values(const Scene& scene);
   void add_texels();
   Dependence dependence_of(const Scene& scene, const Parameter& parameter) const;

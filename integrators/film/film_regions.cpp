@@ -153,44 +153,20 @@ std::pair<int, int> pixels_of(double from, double to, int first, int size) {
           static_cast<int>(std::clamp<double>(std::floor(high) + 1, first, first + size))};
 }
 
-}  // namespace
+// Along which part of the edge a region is seen beside it.
+struct Stretch {
+  double from, to;
+  FaceRef face;
+  bool own;
+};
 
-std::vector<FilmRegions::SeenPart> FilmRegions::seen_parts(const PlanePoint& from,
-                                                           const PlanePoint& to,
-                                                           std::span<const FaceRef> around) const {
-  // Along which part of the edge a region is seen beside it.
-  struct Stretch {
-    double from, to;
-    FaceRef face;
-    bool own;
-  };
-  std::vector<Stretch> stretches;
-  std::vector<double> ends;
-  const auto [y0, y1] = pixels_of(from.y, to.y, film_.crop_y, film_.crop_height);
-  for (int y = y0; y < y1; ++y) {
-    // The part of the edge in this row.
-    double t0 = 0, t1 = 1;
-    if (const double dy = to.y - from.y; dy != 0) {
-      const double a = (y - kNear - from.y) / dy, b = (y + 1 + kNear - from.y) / dy;
-      t0 = std::clamp(std::min(a, b), 0.0, 1.0);
-      t1 = std::clamp(std::max(a, b), 0.0, 1.0);
-    }
-    const auto column = [&](double t) { return from.x + (to.x - from.x) * t; };
-    const auto [x0, x1] = pixels_of(column(t0), column(t1), film_.crop_x, film_.crop_width);
-    for (int x = x0; x < x1; ++x) {
-      for_each_region(x, y, [&](FaceRef face, const PlanePoint&, const PlanePoint&, auto corners) {
-        Stretch s{0, 1, face, std::find(around.begin(), around.end(), face) != around.end()};
-        if (!clip_to(corners, from, to, s.from, s.to)) return;
-        stretches.push_back(s);
-        ends.push_back(s.from);
-        ends.push_back(s.to);
-      });
-    }
-  }
+// What is beside the edge between neighbouring ends of stretches.
+std::vector<FilmRegions::SeenPart> parts_of(std::vector<Stretch> stretches,
+                                            std::vector<double> ends) {
   std::sort(ends.begin(), ends.end());
   std::sort(stretches.begin(), stretches.end(),
             [](const Stretch& a, const Stretch& b) { return a.from < b.from; });
-  std::vector<SeenPart> parts;
+  std::vector<FilmRegions::SeenPart> parts;
   size_t begun = 0, over = 0;  // stretches that have begun; before `over` all have ended
   for (size_t i = 0; i + 1 < ends.size(); ++i) {
     if (ends[i] == ends[i + 1]) continue;
@@ -216,6 +192,37 @@ std::vector<FilmRegions::SeenPart> FilmRegions::seen_parts(const PlanePoint& fro
     }
   }
   return parts;
+}
+
+}  // namespace
+
+std::vector<FilmRegions::SeenPart> FilmRegions::seen_parts(const PlanePoint& from,
+                                                           const PlanePoint& to,
+                                                           std::span<const FaceRef> around) const {
+  std::vector<Stretch> stretches;
+  std::vector<double> ends;
+  const auto [y0, y1] = pixels_of(from.y, to.y, film_.crop_y, film_.crop_height);
+  for (int y = y0; y < y1; ++y) {
+    // The part of the edge in this row.
+    double t0 = 0, t1 = 1;
+    if (const double dy = to.y - from.y; dy != 0) {
+      const double a = (y - kNear - from.y) / dy, b = (y + 1 + kNear - from.y) / dy;
+      t0 = std::clamp(std::min(a, b), 0.0, 1.0);
+      t1 = std::clamp(std::max(a, b), 0.0, 1.0);
+    }
+    const auto column = [&](double t) { return from.x + (to.x - from.x) * t; };
+    const auto [x0, x1] = pixels_of(column(t0), column(t1), film_.crop_x, film_.crop_width);
+    for (int x = x0; x < x1; ++x) {
+      for_each_region(x, y, [&](FaceRef face, const PlanePoint&, const PlanePoint&, auto corners) {
+        Stretch s{0, 1, face, std::find(around.begin(), around.end(), face) != around.end()};
+        if (!clip_to(corners, from, to, s.from, s.to)) return;
+        stretches.push_back(s);
+        ends.push_back(s.from);
+        ends.push_back(s.to);
+      });
+    }
+  }
+  return parts_of(std::move(stretches), std::move(ends));
 }
 
 size_t FilmRegions::size() const {

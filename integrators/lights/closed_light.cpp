@@ -256,12 +256,7 @@ bool ClosedLight::find_outlines(const EmitterPlane& emitter, const Receiver& rec
         clip([&](const Vec3d& w) { return dot(w, *receiver.wedge); }, line + Scratch::kWedge);
       }
     }
-    scratch.points.clear();
-    scratch.lines.clear();
-    for (const Scratch::Corner& corner : scratch.polygon) {
-      scratch.points.push_back(on_grid(corner.w));
-      scratch.lines.push_back(corner.line);
-    }
+    scratch.place(on_grid);
     if (!within) return false;
     if (scratch.points.size() > 2) {
       scratch.outlines.add(scratch.points, scratch.lines, of_emitter, cancelled);

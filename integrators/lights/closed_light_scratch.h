@@ -75,6 +75,15 @@ struct ClosedLight::Scratch {
   std::vector<uint32_t> lines;
   std::vector<CutPoint> cut_points;  // by place, then number
 
+  // The polygon's corners as points and lines of an outline.
+  void place(const auto& on_grid) {
+    points.clear();
+    lines.clear();
+    for (const Corner& corner : polygon) {
+      points.push_back(on_grid(corner.w));
+      lines.push_back(corner.line);
+    }
+  }
   // Keeps what is not below zero in the polygon.
   template <class Height, class OnGrid>
   void clip(const Height& height, uint32_t line, const OnGrid& on_grid) {

@@ -68,40 +68,34 @@ void visit_arguments(Arguments& a, const Visit& visit) {
   visit("truth", a.truth);
 }
 
-struct OptionWriter {
-  json& to;
-  void operator()(const auto& value, const Option& option) const { to[option.name] = value; }
-  void operator()(const Method& method, const Option& option) const {
-    to[option.name] = method.name();
-  }
-  template <Choice T>
-  void operator()(const T& value, const Option& option) const {
-    to[option.name] = word_of(value, option);
-  }
-};
-struct OptionReader {
-  const json& from;
-  void operator()(auto& value, const Option& option) const { from.at(option.name).get_to(value); }
-  void operator()(Method& method, const Option& option) const {
-    method = from.at(option.name).get<std::string>();
-  }
-  template <Choice T>
-  void operator()(T& value, const Option& option) const {
-    set_word(value, option, from.at(option.name).get<std::string>());
-  }
-};
-
 json to_json(const FitArguments& a) {
   json j;
   visit_arguments(a, [&](const char* name, const auto& member) { j[name] = member; });
-  visit_options(a.options, OptionWriter{j});
+  visit_options(a.options, [&]<class T>(const T& value, const Option& option) {
+    if constexpr (Choice<T>) {
+      j[option.name] = word_of(value, option);
+    } else if constexpr (std::same_as<T, Method>) {
+      j[option.name] = value.name();
+    } else {
+      j[option.name] = value;
+    }
+  });
   return j;
 }
 
 FitArguments arguments_from(const json& j) {
   FitArguments a;
   visit_arguments(a, [&](const char* name, auto& member) { j.at(name).get_to(member); });
-  visit_options(a.options, OptionReader{j});
+  visit_options(a.options, [&]<class T>(T& value, const Option& option) {
+    const json& given = j.at(option.name);
+    if constexpr (Choice<T>) {
+      set_word(value, option, given.get<std::string>());
+    } else if constexpr (std::same_as<T, Method>) {
+      value = given.get<std::string>();
+    } else {
+      given.get_to(value);
+    }
+  });
   return a;
 }
 

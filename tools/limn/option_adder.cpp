@@ -11,9 +11,7 @@
 #include "tools/limn/command_support.h"
 
 namespace limn {
-namespace {
 
-// Other options that the text names are spelled as on the command line.
 std::string help_of(const Option& option) {
   const std::string text =
       option.unset ? fmt::format("{} (default: {})", option.help, option.unset) : option.help;
@@ -27,18 +25,6 @@ std::string help_of(const Option& option) {
   }
   return help;
 }
-
-template <class T>
-void add_number(CLI::App& app, T& value, const Option& option) {
-  CLI::Option* added =
-      app.add_option(option_name(option.name), value, help_of(option))->check(within(option));
-  if (option.type) added->type_name(option.type);
-  if constexpr (std::is_arithmetic_v<T>) {
-    if (!option.unset) added->capture_default_str();
-  }
-}
-
-}  // namespace
 
 std::string option_name(std::string field) {
   if (field == "auxiliary rays") return "--aux";
@@ -58,25 +44,6 @@ CLI::Validator within(const Option& option) {
 }
 CLI::Validator within(long double least, long double most) {
   return within(Option{"", "", least, most});
-}
-
-void OptionAdder::operator()(int& value, const Option& option) const {
-  add_number(app_, value, option);
-}
-void OptionAdder::operator()(double& value, const Option& option) const {
-  add_number(app_, value, option);
-}
-void OptionAdder::operator()(std::optional<int>& value, const Option& option) const {
-  add_number(app_, value, option);
-}
-void OptionAdder::operator()(std::optional<uint64_t>& value, const Option& option) const {
-  add_number(app_, value, option);
-}
-
-void OptionAdder::operator()(std::vector<int64_t>& values, const Option& option) const {
-  app_.add_option(option_name(option.name), values, help_of(option))
-      ->delimiter(',')
-      ->check(within(option));
 }
 
 void OptionAdder::operator()(std::vector<std::string>& terms, const Option& option) const {

@@ -13,6 +13,8 @@ namespace limn {
 // How the command line spells a field: "--edge-samples" of "edge_samples".
 std::string option_name(std::string field);
 
+// Of the command line, whose spelling other options have there.
+std::string help_of(const Option& option);
 // A number in the row's range. Nothing else is, nor what is no number.
 CLI::Validator within(const Option& option);
 CLI::Validator within(long double least, long double most);
@@ -22,11 +24,14 @@ class OptionAdder {
  public:
   explicit OptionAdder(CLI::App& app) : app_(app) {}
 
-  void operator()(int& value, const Option& option) const;
-  void operator()(double& value, const Option& option) const;
-  void operator()(std::optional<int>& value, const Option& option) const;
-  void operator()(std::optional<uint64_t>& value, const Option& option) const;
-  void operator()(std::vector<int64_t>& values, const Option& option) const;
+  template <class T>  // numbers
+  void operator()(T& value, const Option& option) const {
+    CLI::Option* added = app_.add_option(option_name(option.name), value, help_of(option));
+    added->check(within(option));
+    if (std::same_as<T, std::vector<int64_t>>) added->delimiter(',');
+    if (option.type) added->type_name(option.type);
+    if (std::is_arithmetic_v<T> && !option.unset) added->capture_default_str();
+  }
   void operator()(std::vector<std::string>& terms, const Option& option) const;
   void operator()(Method& method, const Option& option) const;
   template <Choice T>
