@@ -134,7 +134,7 @@ class Builder {
     return shift[0].x != std::round(shift[0].x) || shift[0].y != std::round(shift[0].y);
   }
 
-  // Of the face, at the welded vertex; -1 if there is none.
+  // The corner of the face at the welded vertex; -1 if there is none.
   int corner_of(FaceId face, VertexId vertex) const {
     for (int k = 0; k < 3; ++k)
       if (ids_[mesh_.face(face)[k]] == vertex) return k;

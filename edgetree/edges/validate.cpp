@@ -84,7 +84,7 @@ const char* fault_of_crossing(const EdgeMesh& mesh, EdgeId id) {
   return nullptr;
 }
 
-// Of a texture: it runs through one face.
+// An edge of a texture runs through one face.
 const char* fault_of_texture(const EdgeMesh& mesh, EdgeId id) {
   const FacesAround around = mesh.around(id);
   if (mesh.places.size() != mesh.positions.size()) return "there are other than V places";

@@ -46,7 +46,7 @@ struct EdgeForest::Impl {
   LightClusters lights;
   Forest forest;
   ShapeId crossings;  // the first object whose ends are not floats, or none: after all shapes
-  // Of trees but those of textures, which are no outlines.
+  // Boxes of all trees but those of textures, which are no outlines.
   RootBoxes boxes, moving_boxes;
 
   ForestQuery prepare(const EdgeQuery& query) const {

@@ -19,7 +19,7 @@ struct ForestPoint {
 ForestPoint point_of(const Forest& forest, const Vec3d& p);
 
 // Query data that do not depend on the node.
-// Whether p and the directions there are static.
+// True if p and the directions there are static.
 bool is_at_rest(const EdgeQuery& query, const Lanes& lane_scale);
 
 struct ForestQuery {

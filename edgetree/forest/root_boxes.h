@@ -12,7 +12,7 @@ namespace limn {
 class RootBoxes {
  public:
   RootBoxes() = default;
-  // Of few trees there are no boxes: all are found.
+  // Few trees have no boxes: all are found.
   RootBoxes(const Forest& forest, std::span<const NodeId> roots);
 
   // Replaces `found` by the trees that may hold a point x with x - p in the cone and above the

@@ -114,8 +114,8 @@ class Bsdf {
   };
   virtual void sample_each(std::span<const Draw> draws) const;
 
-  // What the smooth lobes see from wi: their number, which is the same for all points and
-  // directions. Arguments as of eval.
+  // Writes the rays that the smooth lobes see from wi and returns their number, which is the same
+  // for all points and directions. Arguments as of eval.
   virtual int smooth_rays(const Vec3<double>& /*n*/, const Vec3<double>& /*wi*/,
                           SmoothRays<double>& /*rays*/, const Rgb<double>* /*at*/ = nullptr) const {
     return 0;
@@ -124,7 +124,8 @@ class Bsdf {
                           SmoothRays<Dual>& /*rays*/, const Rgb<Dual>* /*at*/ = nullptr) const {
     return 0;
   }
-  // Of what the rough lobes pass: the index of refraction behind the surface over that in front.
+  // The index of refraction behind the surface over that in front, for light that the rough lobes
+  // pass.
   virtual double eta(const Rgb<double>* /*at*/ = nullptr) const { return 1; }
   // Lambert's law with a constant reflectance, and nothing else.
   virtual bool is_lambertian() const { return false; }
@@ -145,8 +146,8 @@ class Bsdf {
   // The summary of the rough lobes that edge samplers use as importance. By default the hemisphere
   // with albedo 1. With a null `at` its albedo bounds that at all points.
   virtual LobeSummary lobe(const Rgb<double>* /*at*/ = nullptr) const { return {}; }
-  // The same of the rough lobes behind the surface, where there are any, as if they lay in front of
-  // the reversed normal for another viewer.
+  // The summary of the rough lobes behind the surface, where there are any, as if they lay in front
+  // of the reversed normal for another viewer.
   struct PassedLobe {
     Vec3d wi;  // unit, towards that viewer
     LobeSummary lobe;
@@ -163,7 +164,7 @@ class Bsdf {
   virtual Texture& texture(int k) const { return *textures_[k]; }
   // The name of the colour or number that texture k gives ("reflectance").
   virtual std::string texture_name(int k) const { return texture_names_[k]; }
-  // Whether one of them is the tangent of the surface.
+  // True if one of the textures is the tangent of the surface.
   bool needs_tangent() const;
   // at: of texture_count() elements.
   template <class S>
@@ -174,7 +175,7 @@ class Bsdf {
   virtual std::shared_ptr<Bsdf> clone() const = 0;  // deep
   // Nested BSDFs. deep_copy() uses them to preserve sharing.
   virtual std::span<std::shared_ptr<Bsdf>> nested() { return {}; }
-  // Whether mapped normals are used as in Mitsuba (see ShadingModel), also by nested BSDFs.
+  // Lets mapped normals be used as in Mitsuba (see ShadingModel), also by nested BSDFs.
   virtual void set_mitsuba_shading(bool mitsuba) {
     for (const auto& bsdf : nested()) bsdf->set_mitsuba_shading(mitsuba);
   }

@@ -41,7 +41,7 @@ struct StoredImage {
 // first bytes, of at most kMaxPixels pixels. Alpha is dropped. Sizes in the header are checked
 // against the file's size before memory is allocated. InputError names the file.
 StoredImage read_stored_image(const std::string& file);
-// The same in linear floats.
+// Reads an image of any known format as linear floats.
 Image read_image(const std::string& file);
 // InputError at a pixel that is not finite. what: "the texture", for the message.
 void check_finite(const StoredImage& image, const std::string& file, const std::string& what);

@@ -13,7 +13,7 @@ namespace limn {
 
 class LightTree {
  public:
-  // What the estimate needs of an emitter, or of several.
+  // One emitter or several, as the estimate needs them.
   struct Emitter {
     Vec3d center;       // of the light that it sends out
     Vec3d facing;       // sum of face normals times areas times luminance
