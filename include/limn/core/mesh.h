@@ -65,7 +65,7 @@ struct Mesh {
   std::vector<Vec3d> normals;           // N unit vectors; empty for kFace
   std::vector<FaceIndices> normal_ids;  // F by 3, into normals; empty for kFace
 
-  // Whether the shape's material or emitter reads textures. Where not, the next five are empty.
+  // True if the shape's material or emitter reads textures; else the next five are empty.
   bool textured = false;
   UvSource uv_source = UvSource::kNone;
   std::vector<Vec3f> uv_places;

@@ -22,7 +22,7 @@ struct Moved {
   }
 };
 
-// What any of them moves.
+// The union of what the parameters move.
 Moved moved_by(std::span<const Parameter> parameters);
 
 }  // namespace limn

@@ -19,7 +19,7 @@ struct ParameterRef {
   // Range of valid values, inclusive; equal to the range that the scene reader accepts.
   double least = -std::numeric_limits<double>::infinity();
   double most = std::numeric_limits<double>::infinity();
-  // Whether a channel of a colour acts on all channels of what is scattered.
+  // True if a channel of a colour acts on all channels of what is scattered.
   bool mixes_channels = false;
   // To be called after the values have changed, if there is something to update.
   std::function<void()> changed = {};

@@ -58,10 +58,10 @@ class Scattering {
   // About which the lobe lies: that of `normal`, or a mapped one.
   Vec3d lobe_normal() const { return bsdf_->scattering_normal(value(n_), value(wi_), at()); }
   Bsdf::PassedLobe passed_lobe() const { return bsdf_->passed_lobe(value(n_), value(wi_), at()); }
-  // Whether there is more than smooth lobes.
+  // True if there is more than smooth lobes.
   bool is_rough() const { return bsdf_->is_rough(); }
   bool is_smooth() const { return bsdf_->lobes().smooth; }
-  // Whether wo leaves on the other side than that which wi is on.
+  // True if wo leaves on the other side than that which wi is on.
   bool passes(const Vec3d& wo) const { return bsdf_->lobes().through && dot(value(n_), wo) < 0; }
 
   // The probability with which a path goes by the rough lobes: 1 where there are no others.
@@ -73,7 +73,7 @@ class Scattering {
   }
   // Where shares() is not asked: as another has it.
   void share_as(double rough_share) { rough_share_ = rough_share; }
-  // Of the smooth rays the k-th.
+  // The k-th of the smooth rays.
   SmoothRay<S> smooth_ray(int k) const {
     return detail::smooth_ray<S>(*bsdf_, copies_, n_, wi_, k, textures_);
   }
