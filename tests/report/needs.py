@@ -14,7 +14,9 @@ def skip(reason):
 
 def need_matplotlib():
     try:
-        import matplotlib  # noqa: F401
+        # This import makes the list of fonts where there is none yet. It is made here, as matplotlib
+        # writes a warning when that takes long, and tests compare what programs write.
+        import matplotlib.font_manager  # noqa: F401
         import numpy  # noqa: F401
     except ImportError as error:
         skip(f"{error}: apt-get install python3-matplotlib python3-numpy")

@@ -181,19 +181,28 @@ class Suite:
         for point in points:
             self._queue.put(point)
         self.total, self.done, self.began = len(points), 0, time.monotonic()
-        workers = [threading.Thread(target=self._work, daemon=True) for _ in range(self.jobs)]
+        ends = queue.Queue()  # An interrupted join() takes a running thread for finished.
+        workers = [threading.Thread(target=self._work_to_end, args=(ends,), daemon=True)
+                   for _ in range(self.jobs)]
         for worker in workers:
             worker.start()
+        left = len(workers)
         try:
-            for worker in workers:
-                while worker.is_alive():
-                    worker.join(0.2)
+            while left:
+                ends.get()
+                left -= 1
         except KeyboardInterrupt:
             self.program.stop()
             for worker in workers:
                 worker.join(5)
             return False
         return not self.program.stopped
+
+    def _work_to_end(self, ends):
+        try:
+            self._work()
+        finally:
+            ends.put(None)
 
     def _work(self):
         while not self.program.stopped:
