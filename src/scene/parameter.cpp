@@ -41,14 +41,8 @@ size_t edit_distance(const std::string& a, const std::string& b) {
     return edit_distance(name, a) < edit_distance(name, b);
   });
   names.resize(std::min<size_t>(names.size(), 5));
-  std::string message = "unknown parameter \"" + name + "\" (nearest: " + join(names) + ")";
-  const auto nameless = [](const Shape& s) { return s.id.empty(); };
-  const auto count = std::count_if(scene.shapes.begin(), scene.shapes.end(), nameless);
-  if (count > 0) {
-    message += "; " + std::to_string(count) + " of " + std::to_string(scene.shapes.size()) +
-               " shapes have no id and cannot be named";
-  }
-  throw UnknownParameter({scene.file}, message);
+  throw UnknownParameter({scene.file},
+                         "unknown parameter \"" + name + "\" (nearest: " + join(names) + ")");
 }
 
 // Whether a texture in use jumps where no edge is known: then nothing may move.
@@ -194,6 +188,10 @@ std::vector<Parameter> list_parameters(const Scene& scene) {
 Parameter find_parameter_or_array(const Scene& scene, const std::string& name) {
   if (scene.camera.is_orthographic()) {
     throw InputError({scene.file}, "orthographic: there are images, no derivatives");
+  }
+  constexpr std::string_view kOneValue = ".value";
+  if (name.ends_with(kOneValue)) {
+    return find_parameter_or_array(scene, name.substr(0, name.size() - kOneValue.size()));
   }
   const std::vector<Parameter> list = list_parameters(scene);
   for (const Parameter& p : list) {

@@ -195,7 +195,9 @@ class Describer {
 
 SceneDescription describe_scene(const std::string& file, const SceneInput& input,
                                 const std::string* text) {
-  return Describer().describe(load_scene_tree(file, input, text), file);
+  SceneDescription description = Describer().describe(load_scene_tree(file, input, text), file);
+  name_objects(description);
+  return description;
 }
 
 }  // namespace limn

@@ -57,4 +57,10 @@ struct SceneDescription {
 SceneDescription describe_scene(const std::string& file, const SceneInput& input,
                                 const std::string* text);
 
+// Gives shapes and emitters without an id one, by which parameters find them: the name of the mesh
+// file or the type ("sphere", "sphere_1", ...). What stands inside of a shape gets the shape's id
+// with ".bsdf" or ".emitter", as in the keys of Mitsuba's traverse(). Area emitters outside of
+// shapes are for references: they keep theirs.
+void name_objects(SceneDescription& description);
+
 }  // namespace limn

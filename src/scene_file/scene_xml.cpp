@@ -289,7 +289,7 @@ class SceneBuilder {
     instance_ = to_world;
     for (const ObjectDescription* shape : check_group(*groups[0])) {
       const std::string suffix = number == 1 ? "" : "." + std::to_string(number);
-      add_shape(*shape, shape->id.empty() ? "" : shape->id + suffix);
+      add_shape(*shape, shape->id + suffix);
       if (scene_.shapes.back().is_emitter) p.fail("a shapegroup with an emitter");
       instanced_faces_ += scene_.shapes.back().mesh.faces.size();
       if (instanced_faces_ > kMostInstancedFaces) {
@@ -401,6 +401,7 @@ class SceneBuilder {
     check_memory(raw);
     const double grey_value = shape.is_emitter ? 0.0 : 0.5;
     shape.bsdf = bsdfs.empty() ? make_diffuse(grey(grey_value)) : bsdfs[0];
+    if (bsdfs.empty() && !shape.is_emitter) scene_.bsdfs_by_id[id + ".bsdf"] = shape.bsdf;
     options.textured = shape.bsdf->texture_count() > 0 || shape.radiance_texture;
     options.tangents = shape.bsdf->needs_tangent();
     const std::vector<std::string> attributes = check_textures(shape, raw);

@@ -294,9 +294,31 @@ TEST_F(Parameters, UnknownNamesListTheNearest) {
     EXPECT_EQ(error.what(),
               files_.path("s.xml") +
                   ": error: unknown parameter \"tent.translate.w\" (nearest: tent.translate.x, "
-                  "tent.translate.y, tent.translate.z, ball.translate.x, ball.translate.y); 1 "
-                  "of 3 shapes have no id and cannot be named");
+                  "tent.translate.y, tent.translate.z, ball.translate.x, ball.translate.y)");
   }
+}
+
+TEST_F(Parameters, WhatHasNoIdIsNamedByItsFileOrType) {
+  files_.write("nameless.xml", R"(<scene version="3.0.0"><sensor type="perspective"/>
+      <bsdf type="diffuse" id="cube_1"/>
+      <shape type="cube"/>
+      <shape type="obj"><string name="filename" value="smooth.obj"/></shape>
+      <shape type="cube"><bsdf type="diffuse"><rgb name="reflectance" value="0.25"/></bsdf></shape>
+      <shape type="cube"><ref id="cube_1"/></shape>
+      <shape type="disk"><emitter type="area"><rgb name="radiance" value="3"/></emitter></shape>
+      <emitter type="point"/><emitter type="point"/></scene>)");
+  const Scene scene = read_scene(files_.path("nameless.xml"), {}, nullptr);
+  const std::vector<std::string> ids{"cube", "smooth", "cube_2", "cube_3", "disk"};
+  for (size_t i = 0; i < ids.size(); ++i) EXPECT_EQ(scene.shapes[i].id, ids[i]);
+  EXPECT_EQ(scene.delta_lights[1]->id, "point_1");
+  const auto red = [&](const std::string& name) {
+    return find_parameter_or_array(scene, name).value(scene)[0];
+  };
+  EXPECT_EQ(red("cube.bsdf.reflectance"), 0.5);
+  EXPECT_EQ(red("cube_2.bsdf.reflectance.value"), 0.25);
+  EXPECT_EQ(red("disk.emitter.radiance"), 3);
+  EXPECT_EQ(scene.bsdfs_by_id.at("cube_1"), scene.shapes[3].bsdf);
+  EXPECT_FALSE(scene.bsdfs_by_id.contains("cube_3.bsdf"));
 }
 
 std::string message_of(const Scene& scene, const std::string& name) {

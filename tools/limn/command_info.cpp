@@ -16,18 +16,13 @@ namespace {
 
 using nlohmann::json;
 
-std::string shape_name(const Scene& scene, ShapeId shape) {
-  const std::string& id = scene.shape(shape).id;
-  return id.empty() ? fmt::format("shape {} (without id)", shape.index()) : id;
-}
-
 json describe_shape(const Scene& scene, ShapeId id) {
   const Shape& shape = scene.shape(id);
   const EdgeMesh edges = build_edge_mesh(shape.mesh, shape.bsdf->side(false) == nullptr);
   const Bounds bounds = bounds_of(shape.mesh);
   constexpr const char* kNormals[] = {"face", "computed", "from the file"};
   const auto vector = [](const Vec3d& v) { return json::array({v.x, v.y, v.z}); };
-  return {{"name", shape_name(scene, id)},
+  return {{"name", shape.id},
           {"faces", shape.mesh.faces.size()},
           {"vertices", shape.mesh.positions.size()},
           {"collapsed_faces", shape.mesh.collapsed_faces},
@@ -94,7 +89,7 @@ json describe_crossings(const Scene& scene, std::span<const Mesh* const> meshes,
   for (const IntersectionSegment& segment : segments)
     for (const FaceRef face : segment.faces) shapes.insert(face.shape);
   json names = json::array();
-  for (const ShapeId shape : shapes) names.push_back(shape_name(scene, shape));
+  for (const ShapeId shape : shapes) names.push_back(scene.shape(shape).id);
   return {{"segments", segments.size()}, {"shapes", names}};
 }
 
@@ -125,7 +120,7 @@ int run_info(const CommonOptions& common) {
              scene.environment ? scene.environment->describe() : std::string("none"));
   for (const auto& light : scene.delta_lights) {
     report["lights"].push_back({{"name", light->id}, {"light", light->describe()}});
-    fmt::print("light{}: {}\n", light->id.empty() ? "" : " " + light->id, light->describe());
+    fmt::print("light {}: {}\n", light->id, light->describe());
   }
   std::vector<const Mesh*> meshes;
   for (const Shape& shape : scene.shapes) meshes.push_back(&shape.mesh);

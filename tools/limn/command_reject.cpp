@@ -52,7 +52,7 @@ EdgeMesh keep_one_shape(Scene& scene, const std::string& id) {
   std::vector<std::string> known;
   for (size_t i = 0; i < scene.shapes.size(); ++i) {
     const std::string& name = scene.shapes[i].id;
-    if (!name.empty()) known.push_back(name);
+    known.push_back(name);
     if (!id.empty() && name != id) continue;
     EdgeMesh edges = edges_of(scene.shapes[i]);
     if (index < scene.shapes.size() && edges.edges.size() <= chosen.edges.size()) continue;

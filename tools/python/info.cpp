@@ -12,11 +12,6 @@ namespace limn::python {
 
 namespace {
 
-std::string name_of(const Scene& scene, ShapeId shape) {
-  const std::string& id = scene.shape(shape).id;
-  return id.empty() ? "shape " + std::to_string(shape.index()) + " (without id)" : id;
-}
-
 nb::dict describe_edges(const EdgeMesh& edges) {
   nb::dict counts;
   counts["smooth"] = edges.count(EdgeClass::kSmooth);
@@ -34,7 +29,7 @@ nb::dict describe_shape(const Scene& scene, ShapeId id) {
   constexpr const char* kNormals[] = {"face", "computed", "from the file"};
   const auto vector = [](const Vec3d& v) { return std::vector<double>{v.x, v.y, v.z}; };
   nb::dict row;
-  row["name"] = name_of(scene, id);
+  row["name"] = scene.shape(id).id;
   row["faces"] = shape.mesh.faces.size();
   row["vertices"] = shape.mesh.positions.size();
   row["collapsed_faces"] = shape.mesh.collapsed_faces;
@@ -57,7 +52,7 @@ nb::dict describe_crossings(const Scene& scene, int threads) {
     for (const FaceRef face : segment.faces) shapes.insert(face.shape);
   }
   std::vector<std::string> names;
-  for (const ShapeId shape : shapes) names.push_back(name_of(scene, shape));
+  for (const ShapeId shape : shapes) names.push_back(scene.shape(shape).id);
   nb::dict crossings;
   crossings["segments"] = segments.size();
   crossings["shapes"] = names;

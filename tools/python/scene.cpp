@@ -17,7 +17,6 @@ namespace limn::python {
 ShapeId find_shape(const Scene& scene, const std::string& id) {
   std::vector<std::string> known;
   for (uint32_t i = 0; i < scene.shapes.size(); ++i) {
-    if (scene.shapes[i].id.empty()) continue;
     if (scene.shapes[i].id == id) return ShapeId(i);
     known.push_back(scene.shapes[i].id);
   }
