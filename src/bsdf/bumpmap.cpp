@@ -25,6 +25,7 @@ class BumpMap final : public MappedNormal<BumpMap> {
     return normalize(n - along * scale_);
   }
 
+  bool map_is_constant() const { return true; }
   std::vector<ParameterRef> parameters() override { return nested()[0]->parameters(); }
   std::shared_ptr<Bsdf> clone() const override {
     const auto copy = std::make_shared<BumpMap>(*this);

@@ -22,7 +22,8 @@ std::shared_ptr<Bsdf> read_mapped_bsdf(Properties& properties, int own);
 //     2 / (1 + sqrt(1 + a tan^2(n, wo))),   a = min(1, tan^2(n, n_b) / 8)
 // makes the value vanish (Estevez et al. 2019, "A microfacet-based shadowing function to solve the
 // bump terminator problem"; Mitsuba has it, too). So the value is continuous wherever the map is.
-// Map: derives from this and has normal(n, at), n_b from n and the values of its own textures.
+// Map: derives from this and has normal(n, at), n_b from n and the values of its own textures, and
+// map_is_constant(), true if its own numbers are as in is_constant.
 template <class Map>
 class MappedNormal : public Bsdf {
  public:
@@ -63,7 +64,9 @@ class MappedNormal : public Bsdf {
     return mapped_rays(n, wi, rays, at);
   }
 
-  bool is_constant() const final { return nested_->is_constant(); }
+  bool is_constant() const final {
+    return static_cast<const Map&>(*this).map_is_constant() && nested_->is_constant();
+  }
   Vec3d scattering_normal(const Vec3d& n, const Vec3d& wi, const Rgb<double>* at) const final {
     return nested_->scattering_normal(bent(n, wi, at), wi, inner(at));
   }

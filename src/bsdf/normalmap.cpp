@@ -9,10 +9,10 @@ namespace {
 
 class NormalMap final : public MappedNormal<NormalMap> {
  public:
-  NormalMap(std::shared_ptr<Texture> map, std::shared_ptr<Bsdf> nested,
+  NormalMap(const ConstantOrTexture& map, std::shared_ptr<Bsdf> nested,
             const MappedNormalOptions& options)
       : MappedNormal(std::move(nested), options) {
-    map->set_mixes_channels();
+    if (map.texture) map.texture->set_mixes_channels();
     map_ = colour("normalmap", map);
     tangent_ = add_tangent("normalmap");
     outward_ = colour("normalmap", make_outward()).texture;
@@ -23,16 +23,20 @@ class NormalMap final : public MappedNormal<NormalMap> {
   template <class S>
   Vec3<S> normal(const Vec3<S>& n, const Rgb<S>* at) const {
     const auto vector_at = [&](int k) { return Vec3<S>{at[k].r, at[k].g, at[k].b}; };
-    const Vec3<S> m = vector_at(map_.texture) * 2.0 - Vec3<S>{1.0, 1.0, 1.0};
+    const Rgb<S> t = map_.of(at);
+    const Vec3<S> m = Vec3<S>{t.r, t.g, t.b} * 2.0 - Vec3<S>{1.0, 1.0, 1.0};
     const Vec3<S> s = along_surface(n, vector_at(tangent_));
     const double side = dot(value(n), value(vector_at(outward_))) < 0 ? -1 : 1;
     const Vec3<S> sum = s * m.x + cross(n, s) * (m.y * side) + n * m.z;
     return value(length_squared(sum)) > 0 ? normalize(sum) : n;
   }
 
+  bool map_is_constant() const { return limn::is_constant(map_.constant); }
   std::vector<ParameterRef> parameters() override {
-    std::vector<ParameterRef> list = nested()[0]->parameters();
-    add_parameter("normalmap", map_, 0, 1, list);
+    std::vector<ParameterRef> list = nested()[0]->parameters(), own;
+    add_parameter("normalmap", map_, 0, 1, own);
+    for (ParameterRef& p : own) p.mixes_channels = true;
+    list.insert(list.end(), own.begin(), own.end());
     return list;
   }
   std::shared_ptr<Bsdf> clone() const override {
@@ -68,9 +72,12 @@ std::shared_ptr<Bsdf> read_mapped_bsdf(Properties& properties, int own) {
 }
 
 std::shared_ptr<Bsdf> read_normalmap(Properties& properties) {
-  auto map = properties.texture("normalmap");
-  if (!map) properties.fail("normalmap", "a normalmap needs a texture \"normalmap\"");
-  return std::make_shared<NormalMap>(std::move(map), read_mapped_bsdf(properties, 3),
+  const auto texture = properties.texture("normalmap");
+  if (!texture && !properties.has("normalmap"))
+    properties.fail("a normalmap needs a texture \"normalmap\"");
+  const ConstantOrTexture map =
+      texture ? ConstantOrTexture(texture) : properties.rgb("normalmap", {});
+  return std::make_shared<NormalMap>(map, read_mapped_bsdf(properties, 3),
                                      read_mapped_normal_options(properties));
 }
 

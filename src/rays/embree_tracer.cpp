@@ -15,6 +15,7 @@
 #include "limn/core/error.h"
 #include "limn/core/parallel.h"
 #include "limn/core/ray_tracer.h"
+#include "limn/core/touch.h"
 
 namespace limn {
 namespace {
@@ -26,6 +27,7 @@ struct Context {
   const DuplicateFaces* copies;
   // Coplanar and near faces of the ray's start face and of its end face.
   std::span<const FaceRef> beside_start, beside_end;
+  double reach;  // hits nearer to an end of the ray may be rounding
 };
 
 // True if the ray ignores the set of duplicates that `face` represents.
@@ -51,12 +53,40 @@ bool is_skipped(const Context& context, FaceRef face) {
   return is_among(ray.skip_faces);
 }
 
+// True if a ray that leaves `point` of face `from` towards `direction` cannot meet `face`, because
+// all of that lies in the plane of `from` or behind it, up to the rounding of positions. False for
+// points off that plane. Near a side of `from` Embree's floats may meet its neighbour all the same.
+bool is_behind(const Scene& scene, FaceRef from, const Vec3d& point, const Vec3d& direction,
+               FaceRef face) {
+  const auto a = face_corners<double>(scene.shape(from.shape).mesh, from.face);
+  const auto b = face_corners<double>(scene.shape(face.shape).mesh, face.face);
+  Vec3d n = normalize(cross(a[1] - a[0], a[2] - a[0]));
+  if (dot(n, direction) < 0) n = -n;
+  const double tolerance = touch_tolerance(largest_coordinate(a), largest_coordinate(b));
+  return std::fabs(dot(n, point - a[0])) <= tolerance &&
+         std::all_of(b.begin(), b.end(),
+                     [&](const Vec3d& x) { return dot(n, x - a[0]) <= tolerance; });
+}
+
+// True if rounding makes the ray meet a neighbour of its start or end face where it leaves the one
+// or arrives on the other.
+bool is_rounding(const Context& context, FaceRef face, double t) {
+  const Ray& ray = *context.ray;
+  if (t <= context.reach && ray.start.shape.valid() &&
+      is_behind(*context.scene, ray.start, ray.origin, ray.direction, face))
+    return true;
+  return t >= ray.t_max - context.reach && ray.end.shape.valid() &&
+         is_behind(*context.scene, ray.end, ray.origin + ray.direction * ray.t_max, -ray.direction,
+                   face);
+}
+
 void reject_skipped(const RTCFilterFunctionNArguments* arguments) {
   const auto& context = *reinterpret_cast<const Context*>(arguments->context);
   // Rays are traced one at a time.
   const FaceRef face{ShapeId(RTCHitN_geomID(arguments->hit, 1, 0)),
                      FaceId(RTCHitN_primID(arguments->hit, 1, 0))};
-  if (is_skipped(context, face)) arguments->valid[0] = 0;
+  if (is_skipped(context, face) || is_rounding(context, face, RTCRayN_tfar(arguments->ray, 1, 0)))
+    arguments->valid[0] = 0;
 }
 
 RTCRay to_embree(const Ray& ray, const Vec3d& origin) {
@@ -83,6 +113,10 @@ RTCRay to_embree(const Ray& ray, const Vec3d& origin) {
   r.flags = 0;
   return r;
 }
+
+// Hits within this share of the scene's size of an end of the ray may be rounding: the rounding of
+// floats, 2^-22, over the cosines of rays that graze less than 2^-10. Others are not looked at.
+constexpr double kReach = 0x1p-12;
 
 // The origin of Embree's coordinates: nonzero on axes where the scene is far from 0 compared with
 // its size. Subtraction is exact for floats between half and twice this value (Sterbenz 1974). Ray
@@ -133,7 +167,8 @@ class EmbreeTracer final : public RayTracer {
         copies_(faces_->copies),
         overlaps_(faces_->overlaps),
         settles_(!copies_.empty() || !overlaps_.empty()),
-        origin_(origin_of(scene)) {
+        origin_(origin_of(scene)),
+        reach_(kReach * bounds_of(scene).diagonal()) {
     // Without a number of threads: Embree would limit all of TBB to the machine's cores by it.
     device_.reset(rtcNewDevice(nullptr));
     if (!device_) throw InputError("Embree cannot start on this machine");
@@ -230,6 +265,7 @@ class EmbreeTracer final : public RayTracer {
     context.ray = &ray;
     context.scene = &scene_;
     context.copies = &copies_;
+    context.reach = reach_;
     if (!overlaps_.empty()) [[unlikely]] {
       context.beside_start = overlaps_.around(ray.start);
       context.beside_end = overlaps_.around(ray.end);
@@ -241,8 +277,9 @@ class EmbreeTracer final : public RayTracer {
   std::shared_ptr<const CoincidentFaces> faces_;
   const DuplicateFaces& copies_;
   const FaceOverlaps& overlaps_;
-  bool settles_;         // duplicates, coplanar or near faces exist
-  Vec3d origin_;         // origin of Embree's coordinates
+  bool settles_;  // duplicates, coplanar or near faces exist
+  Vec3d origin_;  // origin of Embree's coordinates
+  double reach_;
   EmbreeErrors errors_;  // must be declared before the device that reports to it
   Owned<RTCDevice> device_;
   Owned<RTCScene> rtc_scene_;

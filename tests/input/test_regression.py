@@ -5,6 +5,7 @@ mitsuba-data, on its tests.
     test_regression.py LIMN
 """
 
+import importlib.util
 import os
 import subprocess
 import sys
@@ -49,15 +50,23 @@ class Regression(unittest.TestCase):
             self.write(folder, "right", 0.5, 0.5)
             self.write(folder, "wrong", 0.5, 0.51)
             os.rename(os.path.join(folder, "wrong.xml"), os.path.join(folder, "wrong_path.xml"))
+            # Off by less than Mitsuba's test sees.
+            self.write(folder, "outdated", 0.5, 0.502)
             self.write(folder, "unread", 0.5, 0.5, '<medium type="homogeneous"/>')
             done = regression(folder, "--at-least", "1")
             self.assertEqual(done.returncode, 0, done.stderr)
             lines = {line.split()[0]: line for line in done.stdout.splitlines()}
             self.assertTrue(lines["right.xml"].endswith("passes passes"), done.stdout)
             self.assertTrue(lines["wrong_path.xml"].endswith("FAILS FAILS"), done.stdout)
+            if importlib.util.find_spec("mitsuba"):
+                self.assertTrue(lines["outdated.xml"].endswith("passes passes"), done.stdout)
+                self.assertIn("Mitsuba's own image: ", done.stdout)
+            else:
+                self.assertTrue(lines["outdated.xml"].endswith("passes FAILS"), done.stdout)
+                self.assertIn("Mitsuba is not installed", done.stdout)
             self.assertIn("unknown element <medium>", lines["unread.xml"])
-            self.assertIn("1 pass both of 2 that open, of 3 with references", done.stdout)
-            self.assertEqual(regression(folder, "--at-least", "2").returncode, 1)
+            self.assertRegex(done.stdout, "[12] pass both of 3 that open, of 4 with references")
+            self.assertEqual(regression(folder, "--at-least", "3").returncode, 1)
 
     def test_mitsuba_data(self):
         folder = os.environ.get("MITSUBA_DATA")

@@ -171,5 +171,43 @@ TEST(FacesWithoutArea, AreNeverMet) {
   }
 }
 
+// Rays that start or end next to the sides of a large cube's faces, where floats would meet the
+// face beside theirs.
+TEST(BesideItsFace, ARayMeetsNothingThatDoesNotRiseAboveIt) {
+  Rng rng(7, 8, 9);
+  for (int i = 0; i < 200; ++i) {
+    Scene scene;
+    scene.shapes.emplace_back();
+    Vec3d rows[3];
+    random_rotation(rng, rows);
+    scene.shapes[0].mesh = transformed(cube_mesh(), rows, 1000, {1, -2, 3});
+    const auto tracer = make_embree_tracer(scene, 1);
+    for (uint32_t f = 0; f < 12; ++f) {
+      const FaceRef face{ShapeId(0), FaceId(f)};
+      const auto c = face_corners<double>(scene.shapes[0].mesh, face.face);
+      const Vec3d n = normalize(cross(c[1] - c[0], c[2] - c[0]));
+      const int k = static_cast<int>(3 * rng.uniform());
+      const Vec3d& first = c[k];
+      const Vec3d& second = c[(k + 1) % 3];
+      const bool is_diagonal = length(second - first) > 2500;
+      const double inside = 1e-8 * rng.uniform();
+      const Vec3d p =
+          (first + (second - first) * rng.uniform()) * (1 - inside) + c[(k + 2) % 3] * inside;
+      Vec3d out = random_direction(rng);
+      if (dot(out, n) < 0) out = -out;
+      Hit hit;
+      Ray leaves{p, out};
+      leaves.start = face;
+      EXPECT_FALSE(tracer->occluded(leaves));
+      EXPECT_FALSE(tracer->closest(leaves, hit));
+      Ray arrives{p + out * 100, -out, 0, 100};
+      arrives.end = face;
+      EXPECT_FALSE(tracer->occluded(arrives));
+      leaves.direction = -out;
+      EXPECT_TRUE(tracer->closest(leaves, hit) || !is_diagonal);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace limn

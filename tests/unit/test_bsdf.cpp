@@ -8,6 +8,8 @@
 #include "limn/core/error.h"
 #include "limn/core/rng.h"
 #include "support/bsdf_cases.h"
+#include "support/held_textures.h"
+#include "support/meshes.h"
 #include "support/test_properties.h"
 
 namespace limn {
@@ -508,6 +510,36 @@ TEST(Bsdf, DefaultsAreMitsubas) {
                 ->lobe()
                 .alpha,
             0.3);
+}
+
+TEST(NormalMap, OfAConstantIsThatOfATexture) {
+  const Rgb<double> t{0.6, 0.45, 0.95}, tangent{0.9, -1.3, 0.4}, outward{0.1, 0.2, 0.7};
+  const auto make = [&](bool constant) {
+    TestProperties texture("texture", "checkerboard");
+    std::map<std::string, TestProperties::Value> values;
+    if (constant) values["normalmap"] = t;
+    TestProperties properties("bsdf", "normalmap", std::move(values),
+                              {make_diffuse(Rgb<double>{0.2, 0.5, 0.9})});
+    if (!constant) properties.textures["normalmap"] = make_texture(texture);
+    return make_bsdf(properties);
+  };
+  const auto constant = make(true);
+  const std::vector<ParameterRef> parameters = constant->parameters();
+  ASSERT_EQ(parameters.back().name, "normalmap");
+  EXPECT_EQ(parameters.back().values.size(), 3u);
+  EXPECT_TRUE(parameters.back().mixes_channels);
+  EXPECT_TRUE(constant->is_constant());
+  parameters.back().values[1]->d[0] = 1;
+  EXPECT_FALSE(constant->is_constant());
+  const test::HeldTextures held(make(false), {t, tangent, outward});
+  const test::HeldTextures of_constant(constant, {tangent, outward});
+  Rng rng(1, 2, 3);
+  for (int i = 0; i < 100; ++i) {
+    const Vec3d n = random_direction(rng), wi = random_direction(rng), wo = random_direction(rng);
+    const Rgb<double> a = held.eval(n, wi, wo, nullptr), b = of_constant.eval(n, wi, wo, nullptr);
+    EXPECT_EQ(a.r, b.r);
+    EXPECT_EQ(a.b, b.b);
+  }
 }
 
 void expect_error(const std::string& part, const std::string& type,

@@ -13,10 +13,14 @@ Two tests for each, of two million samples, by --shading mitsuba:
   from the reference's variance alone, is above 1 - 0.99^(1 / pixels) for 99.75 % of the values.
 - limn's: SEEDS images of their own seeds, and with their means by blocks of pixels a normal score
   of the difference from the reference, both variances together. All blocks agree if a score as
-  large as the largest has a probability above 1e-4 among so many.
+  large as the largest has a probability above 1e-4 among so many. Where only this test fails,
+  Mitsuba 3.9.1 renders the scene: if its image fails, too, the reference is not Mitsuba's image any
+  more, and limn's is held against the new one. Two reasons are known: a sum of 32000 numbers in
+  single precision is off by up to 1e-3 where they are equal (1.00108 for a red of 1), and scalar
+  variants of Mitsuba tabulate filters in 31 steps.
 
-With --at-least the exit status is 1 where fewer scenes pass both. Reading files that are neither
-plain nor zipped takes `pip install mitsuba==3.9.1`.
+With --at-least the exit status is 1 where fewer scenes pass both. That, and files that are neither
+plain nor zipped, takes `pip install mitsuba==3.9.1`.
 """
 
 import argparse
@@ -36,6 +40,8 @@ import exr  # noqa: E402
 SAMPLES = 2e6
 SEEDS = 8
 REFERENCE_SAMPLES = 32000
+LEAST_SHARE = 0.9975
+LEAST_P = 1e-4
 XYZ = np.array([[0.412453, 0.357580, 0.180423], [0.212671, 0.715160, 0.072169],
                 [0.019334, 0.119193, 0.950227]])
 erfc = np.vectorize(math.erfc, otypes=[float])
@@ -77,6 +83,16 @@ def images_of(limn, scene, options, spp):
     return np.stack(images)
 
 
+def mitsuba_images_of(scene, options, spp):
+    """The same by Mitsuba itself, in a variant that has exact filters, as limn has."""
+    import mitsuba as mi
+    mi.set_variant("llvm_ad_rgb")
+    values = dict(text.split("=", 1) for flag, text in zip(options, options[1:]) if flag == "-D")
+    loaded = mi.load_file(scene, **values)
+    return np.stack([np.array(mi.render(loaded, seed=seed, spp=spp), dtype=np.float64)[..., :3]
+                     for seed in range(SEEDS)])
+
+
 def mitsuba_share(image, reference, variance, spp):
     """The share of values that pass Mitsuba's test."""
     image, reference, variance = (x @ XYZ.T for x in (image, reference, variance))
@@ -91,23 +107,53 @@ def block_sums(values, block):
     return np.add.reduceat(rows, range(0, values.shape[-2], block), axis=-2)
 
 
-def limn_score(images, reference, variance):
-    """The largest score of a block, and the probability of one as large among so many."""
-    block = max(1, -(-max(reference.shape[:2]) // 8))
-    sums = block_sums(images, block)
-    ours = sums.var(axis=0, ddof=1) / SEEDS
+def block_of(image):
+    return max(1, -(-max(image.shape[:2]) // 8))
+
+
+def mean_of(images):
+    """The mean of the images' blocks, and its variance."""
+    sums = block_sums(images, block_of(images[0]))
+    return sums.mean(axis=0), sums.var(axis=0, ddof=1) / SEEDS
+
+
+def reference_of(image, variance):
+    """The same for a reference, whose variance is that of one sample."""
+    block = block_of(image)
     # Variances as differences of squares may come out below zero.
-    theirs = block_sums(np.maximum(variance, 0), block) / REFERENCE_SAMPLES
+    return block_sums(image, block), block_sums(np.maximum(variance, 0), block) / REFERENCE_SAMPLES
+
+
+def largest_score(images, theirs, their_seeds):
+    """The largest score of a block, and the probability of one as large among so many.
+
+    theirs: what mean_of or reference_of says; their_seeds: SEEDS or infinity, likewise.
+    """
+    mean, ours = mean_of(images)
     # Images in halves: one rounding of each pixel.
-    rounding = block_sums((reference * 2.0**-11) ** 2, block) + 1e-20
-    total = ours + theirs + rounding
-    t = (sums.mean(axis=0) - block_sums(reference, block)) / np.sqrt(total)
+    rounding = block_sums((images.mean(axis=0) * 2.0**-11) ** 2, block_of(images[0])) + 1e-20
+    total = ours + theirs[1] + rounding
+    t = (mean - theirs[0]) / np.sqrt(total)
     # Welch's t, as a normal score of the same tail (Wallace 1959).
-    nu = np.minimum(total**2 * (SEEDS - 1) / np.maximum(ours**2, 1e-300), 1e6)
+    known = ours**2 / (SEEDS - 1) + theirs[1]**2 / (their_seeds - 1)
+    nu = np.minimum(total**2 / np.maximum(known, 1e-300), 1e6)
     z = np.sqrt(nu * np.log1p(t * t / nu)) * (8 * nu + 1) / (8 * nu + 3)
     largest = z.max()
     p = -math.expm1(z.size * math.log1p(-min(1 - 1e-16, math.erfc(largest / math.sqrt(2)))))
     return largest, p
+
+
+def judge_reference(images, theirs, scene, options, spp):
+    """True if Mitsuba's image of today is not the reference, but limn's image; and words for it."""
+    try:
+        mitsuba_images = mitsuba_images_of(scene, options, 4 * spp)
+    except ImportError:
+        return False, f"{'':6}Mitsuba is not installed, which could say whether the reference is its"
+    apart, p_apart = largest_score(mitsuba_images, theirs, math.inf)
+    ours, p_ours = largest_score(images, mean_of(mitsuba_images), SEEDS)
+    words = (f"{'':6}Mitsuba's own image: max z {apart:.2f} (p {p_apart:.2g}) from the reference, "
+             f"{ours:.2f} (p {p_ours:.2g}) from limn's")
+    return p_apart <= LEAST_P < p_ours, words
 
 
 def main():
@@ -142,11 +188,17 @@ def main():
             print(f"{name:52} sizes differ: {images.shape[1:]} {reference.shape}", flush=True)
             continue
         share = mitsuba_share(images.mean(axis=0), reference, variance, SEEDS * spp)
-        largest, p = limn_score(images, reference, variance)
-        good = share >= 0.9975, p > 1e-4
+        theirs = reference_of(reference, variance)
+        largest, p = largest_score(images, theirs, math.inf)
+        right, why = p > LEAST_P, ""
+        if not right and share >= LEAST_SHARE:
+            right, why = judge_reference(images, theirs, scene, options, spp)
+        good = share >= LEAST_SHARE, right
         passed += all(good)
         words = " ".join("passes" if g else "FAILS" for g in good)
         print(f"{name:52} {share:13.4%} {largest:12.2f} {p:8.2g}  {words}", flush=True)
+        if why:
+            print(why, flush=True)
     print(f"{passed} pass both of {tested} that open, of {found} with references")
     return 0 if passed >= arguments.at_least else 1
 
