@@ -86,6 +86,8 @@ def images_of(limn, scene, options, spp):
 def mitsuba_images_of(scene, options, spp):
     """The same by Mitsuba itself, in a variant that has exact filters, as limn has."""
     import mitsuba as mi
+    if not hasattr(mi, "set_variant"):
+        raise ImportError("this is the folder that this file is in")
     mi.set_variant("llvm_ad_rgb")
     values = dict(text.split("=", 1) for flag, text in zip(options, options[1:]) if flag == "-D")
     loaded = mi.load_file(scene, **values)
