@@ -9,7 +9,6 @@
 #include "edgetree/forest/forest_choice.h"
 #include "edgetree/forest/forest_query.h"
 #include "edgetree/forest/forest_rejection.h"
-#include "edgetree/forest/root_boxes.h"
 #include "edgetree/lobe/seen_edge.h"
 
 namespace limn {
@@ -46,8 +45,8 @@ struct EdgeForest::Impl {
   LightClusters lights;
   Forest forest;
   ShapeId crossings;  // the first object whose ends are not floats, or none: after all shapes
-  // Boxes of all trees but those of textures, which are no outlines.
-  RootBoxes boxes, moving_boxes;
+  // The roots but those of textures, which are no outlines.
+  std::vector<NodeId> outlines, moving_outlines;
 
   ForestQuery prepare(const EdgeQuery& query) const {
     const bool lit = config.light_term && !lights.empty();
@@ -154,15 +153,12 @@ std::unique_ptr<EdgeForest> EdgeForest::build(const EdgeSamplerInput& input, int
                                              crossings,
                                              {},
                                              {}});
-  const auto outlines_of = [&](const std::vector<NodeId>& roots) {
-    std::vector<NodeId> some;
-    std::ranges::copy_if(roots, std::back_inserter(some), [&](NodeId root) {
-      return !input.object(impl->forest.head(root).object).of_texture();
-    });
-    return RootBoxes(impl->forest, some);
+  const auto is_outline = [&](NodeId root) {
+    return !input.object(impl->forest.head(root).object).of_texture();
   };
-  impl->boxes = outlines_of(impl->forest.roots);
-  impl->moving_boxes = outlines_of(impl->forest.moving_roots);
+  std::ranges::copy_if(impl->forest.roots, std::back_inserter(impl->outlines), is_outline);
+  std::ranges::copy_if(impl->forest.moving_roots, std::back_inserter(impl->moving_outlines),
+                       is_outline);
   return std::unique_ptr<EdgeForest>(new EdgeForest(std::move(impl)));
 }
 
@@ -251,9 +247,8 @@ bool EdgeForest::list_outlines(const EdgeQuery& query, const DirectionCone& dire
   const ForestCone cone(forest, query, directions, input.lane_scale);
   const OwnEdges own(input, query, forest.extent);
   static thread_local std::vector<NodeId> stack;
-  const RootBoxes& boxes = cone.at_rest ? impl_->moving_boxes : impl_->boxes;
-  boxes.find(query.p, query.n, directions, stack);
-  std::reverse(stack.begin(), stack.end());
+  const std::vector<NodeId>& roots = cone.at_rest ? impl_->moving_outlines : impl_->outlines;
+  stack.assign(roots.rbegin(), roots.rend());
   while (!stack.empty()) {
     const NodeId id = stack.back();
     stack.pop_back();

@@ -33,7 +33,8 @@ struct NodeHead {
   float center[3];
   float inverse_radius;
   uint32_t parent;  // kWidth * inner node + index of the child
-  ShapeId object;
+  ShapeId object;   // of nodes above several trees: that of one of them
+  uint32_t motion;  // index in Forest::motions
   ForestGroup group;
   uint8_t height;  // 0 for edge nodes, else 1 + the largest height of a child
 };
@@ -74,9 +75,10 @@ struct alignas(64) EdgeNode {
 struct Forest {
   std::vector<InnerNode> inner;
   std::vector<EdgeNode> edges;
+  // Of the trees of objects and groups, or of nodes above many of them.
   std::vector<NodeId> roots;
   std::vector<NodeId> moving_roots;   // of them, those with edges that move by themselves
-  std::vector<ObjectMotion> motions;  // of the objects
+  std::vector<ObjectMotion> motions;  // no motion, then those of objects that move
   double extent = 0;                  // largest |x| of a position
   // [object][edge]: kWidth * edge node + index of the child, or kNoParent.
   std::vector<std::vector<uint32_t>> slots;

@@ -253,7 +253,7 @@ struct Normals {
 // its box, from boxes_of.
 Floats speed_below(const InnerNode& node, const ForestQuery& query, const DualPlane& plane,
                    const Floats3& d, const Floats3& half) {
-  const SeenMotion& motion = query.motion_of(node.head.object);
+  const SeenMotion& motion = query.seen(node.head.motion);
   const float unit = query.unit / node.head.inverse_radius;
   const bool silhouettes = node.head.group == ForestGroup::kSilhouette;
   std::optional<Normals> normals;
@@ -283,7 +283,7 @@ Floats speed_below(const InnerNode& node, const ForestQuery& query, const DualPl
 // through p and them, of any length.
 Floats speed_of(const EdgeNode& node, const ForestQuery& query, const Floats3& w_0,
                 const Floats3& w_1, const Floats3& normal) {
-  const SeenMotion& motion = query.motion_of(node.head.object);
+  const SeenMotion& motion = query.seen(node.head.motion);
   const Floats quarter_inverse = 0.25f / max(dot(normal, normal), splat(kLeast));
   Floats sum = node.speed;
   for (int i = 0; i < motion.count; ++i) {
@@ -360,12 +360,12 @@ ForestQuery::ForestQuery(const Forest& tree, const LightClusters* clusters,
   if (query.face.shape.valid()) own_plane = scene.object(query.face.shape).plane(query.face.face);
 }
 
-const SeenMotion& ForestQuery::motion_of(ShapeId object) const {
-  if (object != seen_) {
-    motion_ = SeenMotion(forest.motions[object.index()], *viewer_);
-    seen_ = object;
+const SeenMotion& ForestQuery::seen(uint32_t motion) const {
+  if (motion != motion_) {
+    seen_ = SeenMotion(forest.motions[motion], *viewer_);
+    motion_ = motion;
   }
-  return motion_;
+  return seen_;
 }
 
 Ints may_hold_candidates(const InnerNode& node, const ForestPoint& point) {

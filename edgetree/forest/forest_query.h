@@ -43,13 +43,13 @@ struct ForestQuery {
   bool at_rest;
   std::optional<Plane> own_plane;  // plane of the query's own face, if any
 
-  // Motion of an object as seen from p; valid until the next call.
-  const SeenMotion& motion_of(ShapeId object) const;
+  // One of Forest::motions as seen from p; valid until the next call.
+  const SeenMotion& seen(uint32_t motion) const;
 
  private:
   std::optional<ViewerMotion> viewer_;
-  mutable ShapeId seen_;
-  mutable SeenMotion motion_;
+  mutable uint32_t motion_ = UINT32_MAX;  // of seen_; none so far
+  mutable SeenMotion seen_;
 };
 
 // Mask (-1 or 0) of children that may hold an edge of E(p): conservative.

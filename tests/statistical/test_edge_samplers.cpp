@@ -109,6 +109,39 @@ EdgeSamplerInput test_input(const Mesh& mesh) {
           .environment_luminance = 1};
 }
 
+// Small objects around the origin, a fifth of which move, over a large one.
+EdgeSamplerInput many_objects() {
+  Rng rng(29, 0, 0);
+  EdgeSamplerInput input;
+  input.environment_luminance = 1;
+  for (uint32_t o = 0; o < 81; ++o) {
+    Vec3d rows[3];
+    random_rotation(rng, rows);
+    const Vec3d at = o == 0 ? Vec3d{0, 0, -2} : random_direction(rng) * (2 * rng.uniform());
+    Mesh mesh = transformed(o % 2 == 0 ? grid_mesh(1) : cube_mesh(), rows, o == 0 ? 2 : 0.05, at);
+    if (o % 5 == 4) set_test_tangents(mesh);
+    input.objects.push_back(build_edge_mesh(mesh, o % 3 != 0, ShapeId(o)));
+  }
+  return input;
+}
+
+struct NamedInput {
+  std::string name;
+  EdgeSamplerInput input;
+};
+std::vector<NamedInput> test_inputs() {
+  std::vector<NamedInput> inputs;
+  for (const auto& [name, mesh] : test_meshes()) inputs.push_back({name, test_input(mesh)});
+  inputs.push_back({"many objects", many_objects()});
+  return inputs;
+}
+// Of six queries the last is at rest.
+EdgeQuery random_query(int i, Rng& rng) {
+  EdgeQuery q = random_query(rng);
+  if (i == 5) q.velocity = {};
+  return q;
+}
+
 template <class F>
 void for_every_edge(const EdgeSamplerInput& input, F f) {
   for (uint32_t o = 0; o < input.objects.size(); ++o)
@@ -208,11 +241,10 @@ class EdgeSamplers : public testing::TestWithParam<std::string> {
 
 TEST_P(EdgeSamplers, DrawAsTheyState) {
   Rng rng(14, 0, 0);
-  for (const auto& [name, mesh] : test_meshes()) {
-    const EdgeSamplerInput input = test_input(mesh);
+  for (const auto& [name, input] : test_inputs()) {
     const auto sampler = make(input);
     for (int i = 0; i < 6; ++i) {
-      const EdgeQuery q = random_query(rng);
+      const EdgeQuery q = random_query(i, rng);
       // An ablation draws by the code of its sampler, from weights of its own: each draw's
       // probability is compared exactly, and how often it comes at all needs fewer.
       const int draws = is_variant(GetParam()) ? 5000 : 20000;
@@ -256,8 +288,7 @@ TEST_P(EdgeSamplers, DrawAsTheyState) {
 TEST_P(EdgeSamplers, SeveralAtOnceAreDrawnAsTheyState) {
   Rng rng(20, 0, 0);
   std::vector<std::optional<EdgeSample>> samples;
-  for (const auto& [name, mesh] : test_meshes()) {
-    const EdgeSamplerInput input = test_input(mesh);
+  for (const auto& [name, input] : test_inputs()) {
     const auto sampler = make(input);
     for (const int several : {2, 7}) {
       const EdgeQuery q = random_query(rng);
@@ -375,11 +406,10 @@ TEST_P(EdgeSamplers, DensityAlongTheEdge) {
 // The estimator f |J| / (P p) against the sum of all edges' integrals.
 TEST_P(EdgeSamplers, EstimateTheSumOverAllEdges) {
   Rng rng(17, 0, 0);
-  for (const auto& [name, mesh] : test_meshes()) {
-    const EdgeSamplerInput input = test_input(mesh);
+  for (const auto& [name, input] : test_inputs()) {
     const auto sampler = make(input);
     for (int i = 0; i < 6; ++i) {
-      EdgeQuery q = random_query(rng);
+      EdgeQuery q = random_query(i, rng);
       // Tails that span hundreds of decades if the lobe is narrow: no variance to speak of.
       const bool long_tail = is_beckmann(q.lobe) || is_phong(q.lobe);
       q.lobe.alpha = std::max(q.lobe.alpha, long_tail ? 0.4 : 0.05);

@@ -133,7 +133,9 @@ class Walk {
       require_node(child);
       const NodeHead& head = forest_.head(child);
       require(head.parent == kWidth * index + lane, "a child has another parent");
-      require(head.object == node.head.object && head.group == node.head.group,
+      // Nodes above several trees have no group that rejects, and no motion.
+      const bool is_above = node.head.group == ForestGroup::kAlways && node.head.motion == 0;
+      require(is_above || (head.object == node.head.object && head.group == node.head.group),
               "a child is of another tree");
       highest = std::max<int>(highest, head.height);
       require(node.speed[lane] >= 0, "a speed is negative");

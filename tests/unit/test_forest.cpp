@@ -165,8 +165,10 @@ TEST_P(Forests, ListOutlinesOfManyObjects) {
       if (o % 5 == 0) set_test_tangents(mesh);
       input.objects.push_back(build_edge_mesh(mesh, o % 3 != 0, ShapeId(o)));
     }
+    EXPECT_EQ(fault_of(build_forest(input, 1, GetParam()), input.objects), "");
     const auto forest = EdgeForest::build(input, 1, GetParam());
     for (int k = 0; k < 120; ++k) {
+      expect_complete(input, *forest, random_point(input.objects[k % 60], scale, rng), "many");
       EdgeQuery query;
       query.p = random_point(input.objects[k % 60], scale, rng);
       query.n = random_direction(rng);
@@ -417,7 +419,7 @@ TEST(Forest, SeesHowEdgesMove) {
     const Forest forest = build_forest(input, 1, {});
     const EdgeQuery query = moving_query(round % 2 == 0, rng);
     const ForestQuery prepared(forest, nullptr, nullptr, query, input);
-    const SeenMotion& seen = prepared.motion_of(ShapeId(0));
+    const SeenMotion& seen = prepared.seen(forest.head(forest.roots[0]).motion);
     ASSERT_EQ(seen.count, 3);  // the scale of the last lane is 0
     for (uint32_t v = 0; v < mesh.positions.size(); ++v) {
       const Vec3<Lanes> u = relative_velocity(mesh, VertexId(v), query);
@@ -442,7 +444,7 @@ TEST(Forest, KeepsMotionThatIsNotLinear) {
     EdgeMesh& mesh = input.objects[0];
     for (Vec3<Lanes>& v : mesh.tangents) v = v + random_velocity(rng) * bent;
     const Forest forest = build_forest(input, 1, {});
-    const ObjectMotion& motion = forest.motions[0];
+    const ObjectMotion& motion = forest.motions[forest.head(forest.roots[0]).motion];
     EXPECT_EQ(sum_of_speeds(motion.at_center) > 0, bent < 1);
     for (const EdgeNode& node : forest.edges)
       for (int lane = 0; lane < kWidth; ++lane) {
