@@ -1,10 +1,11 @@
-// The hyperplane onto which the planes of a node are projected, from normals alone or by a linear
-// program.
+// The hyperplane onto which the planes of a node are projected, from normals alone, from the planes'
+// hull or by a linear program.
 #include "edgetree/bounds/normaliser.h"
 
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "edgetree/bounds/linear_program.h"
 
@@ -105,26 +106,30 @@ struct Hull {
   }
 };
 
-// True if a convex combination of the points is shorter than half of kMinSeparation: then no unit Z
-// has that product with all of them (half of it is far beyond rounding). Wolfe's algorithm for the
-// point of least norm in a convex hull. It may give up without an answer; the linear programs then
-// find the same result more slowly.
-bool surrounds_origin(const std::vector<Vector4d>& points) {
+// Wolfe's algorithm for the point of least norm in a convex hull: the normal of the hyperplane
+// through the origin that is farthest from all points. Zero if a convex combination of the points
+// is shorter than half of kMinSeparation: then no unit Z has that product with all of them (half of
+// it is far beyond rounding). It may give up without an answer; the linear programs then find one
+// more slowly.
+std::optional<Vector4d> nearest_of_hull(const std::vector<Vector4d>& points) {
   constexpr int kSteps = 32;  // not tuned
   Hull hull;
   hull.points[hull.count++] = points[0];
   hull.weights[0] = 1;
   for (int step = 0; step < kSteps; ++step) {
     const Vector4d mean = hull.mean();
-    if (mean.norm() < 0.5 * kMinSeparation) return true;
+    const double norm = mean.norm();
+    if (norm < 0.5 * kMinSeparation) return Vector4d::Zero();
     const Farthest least = least_product(points, mean);
-    if (!(least.value <= 0) || hull.count == Hull::kMost) return false;
+    // Any valid Z suffices: nearly optimal is enough.
+    if (least.value > 0.5 * norm * norm) return mean / norm;
+    if (hull.count == Hull::kMost) return {};
     hull.points[hull.count] = points[least.index];
     hull.weights[hull.count++] = 0;
     while (hull.count > 1 && hull.shorten()) {
     }
   }
-  return false;
+  return {};
 }
 
 // Solves the linear program by adding the most violated constraints until none is left.
@@ -156,8 +161,8 @@ Vector4d normaliser_of(const std::vector<Vector4d>& points) {
   // Below this, the chart would be five times larger than necessary. Not tuned.
   constexpr double kWide = 0.2;
   if (least >= kWide) return z;
-  if (surrounds_origin(points)) return Vector4d::Zero();
-  const Vector4d other = farthest_hyperplane(points);
+  const std::optional<Vector4d> nearest = nearest_of_hull(points);
+  const Vector4d other = nearest ? *nearest : farthest_hyperplane(points);
   const double other_least = other.norm() > 0 ? least_product(points, other).value : 0;
   if (std::max(least, other_least) < kMinSeparation) return Vector4d::Zero();
   return least >= other_least ? z : other;
