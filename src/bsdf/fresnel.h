@@ -1,6 +1,7 @@
 #pragma once
 // What a smooth surface between two media without absorption reflects and passes, over double or
 // Dual.
+#include <algorithm>
 #include <cmath>
 
 #include "limn/core/dual.h"
@@ -27,6 +28,38 @@ Fresnel<S> fresnel_dielectric(const S& cos_i, const S& eta) {
   const S p = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
   return {0.5 * (s * s + p * p), cos_t, false};
 }
+
+// Whether a facet reflects or passes light, by the coarse digit of a number that also draws the
+// facet: its probability has steps of 1 / kSteps, so the rest of the number stays uniform.
+class FacetSide {
+ public:
+  static constexpr int kSteps = 40;
+
+  // Of a facet that reflects, passes so much; neither is chosen with less than 0.1, as derivatives
+  // need not be small where the value is. Not tuned.
+  FacetSide(double reflects, double passes)
+      : reflecting_(passes == 0    ? kSteps
+                    : reflects > 0 ? std::clamp(static_cast<int>(std::lround(
+                                                    kSteps * (reflects / (reflects + passes)))),
+                                                kSteps / 10, kSteps - kSteps / 10)
+                                   : kSteps / 10) {}
+
+  double reflecting() const { return static_cast<double>(reflecting_) / kSteps; }
+  double passing() const { return static_cast<double>(kSteps - reflecting_) / kSteps; }
+  bool reflects(int digit) const { return digit < reflecting_; }
+
+ private:
+  int reflecting_;  // digits for which it does
+};
+
+// u in [0, 1) as a digit below FacetSide::kSteps and the rest, in [0, 1).
+struct FacetDigit {
+  explicit FacetDigit(double u)
+      : digit(std::min(static_cast<int>(u * FacetSide::kSteps), FacetSide::kSteps - 1)),
+        rest(u * FacetSide::kSteps - digit) {}
+  int digit;
+  double rest;
+};
 
 // What the border reflects of diffuse light from inside, eta > 1: Mitsuba's fit.
 template <class S>

@@ -113,11 +113,13 @@ class Principled final : public SidedBsdf {
   template <class S>
   S clearcoat(const Vec3<S>& n, const Vec3<S>& wi, const Vec3<S>& wo, const Rgb<S>* at) const;
 
-  // Probabilities of drawing from the parts; the main lobe's is divided between its two sides.
+  // Probabilities of drawing from the parts.
   struct Shares {
-    double diffuse, clearcoat, reflected, passed;
+    double diffuse, clearcoat, main;
   };
-  Shares shares(bool front, double cos_i, const Rgb<double>* at) const;
+  Shares shares(bool front, const Rgb<double>* at) const;
+  // How the main lobe's is divided between its two sides.
+  FacetSide facet_side(bool front, double cos_h, const Rgb<double>* at) const;
 
   BsdfColour base_color_;
   std::array<BsdfNumber, kNumbers> numbers_;
@@ -253,28 +255,32 @@ Rgb<S> Principled::passed(bool front, const Vec3<S>& n, const Vec3<S>& wi, const
   return {sqrt(color.r) * weight, sqrt(color.g) * weight, sqrt(color.b) * weight};
 }
 
-// As in Mitsuba, but that the main lobe, which reaches all directions, is never left out, and that
-// its sides are chosen by Fresnel's reflectance at the surface's normal, each with 0.1 at least.
-Principled::Shares Principled::shares(bool front, double cos_i, const Rgb<double>* at) const {
+// As in Mitsuba, but that the main lobe, which reaches all directions, is never left out.
+Principled::Shares Principled::shares(bool front, const Rgb<double>* at) const {
+  if (!front) return {0, 0, 1};
   const double nonmetal = std::max(0.0, 1 - of(kMetallic, at));
   const double through = passes() ? nonmetal * of(kSpecTrans, at) : 0;
-  const double reflected = fresnel_dielectric<double>(cos_i, eta<double>(front)).reflected;
-  const double side = passes() ? std::clamp((front ? through : 1) * (1 - reflected), 0.1, 0.9) : 0;
-  if (!front) return {0, 0, 1 - side, side};
   const double diffuse = diffuse_rate_ * (nonmetal - through);
   const double clearcoat = clearcoat_rate_ * 0.25 * std::max(0.0, of(kClearcoat, at));
   const double specular = std::max(specular_rate_, 0.1 * (diffuse + clearcoat));
   const double sum = diffuse + clearcoat + specular;
-  if (!(sum > 0)) return {0, 0, 1 - side, side};
-  const double main = specular / sum;
-  return {diffuse / sum, clearcoat / sum, main * (1 - side), main * side};
+  if (!(sum > 0)) return {0, 0, 1};
+  return {diffuse / sum, clearcoat / sum, specular / sum};
+}
+
+FacetSide Principled::facet_side(bool front, double cos_h, const Rgb<double>* at) const {
+  if (!passes()) return {1, 0};
+  const double passed = 1 - fresnel_dielectric<double>(cos_h, eta<double>(front)).reflected;
+  const double through = std::max(0.0, 1 - of(kMetallic, at)) * of(kSpecTrans, at);
+  const double share = (front ? std::max(through, 1e-300) : 1) * passed;
+  return {1 - share, share};
 }
 
 double Principled::pdf_from(bool front, const Vec3d& n, const Vec3d& wi, const Vec3d& wo,
                             const Rgb<double>* at) const {
   const double cos_i = dot(n, wi), cos_o = dot(n, wo);
   if (!(cos_i > 0) || cos_o == 0) return 0;
-  const Shares share = shares(front, cos_i, at);
+  const Shares share = shares(front, at);
   if (cos_o < 0) {
     if (!passes()) return 0;
     const double index = eta<double>(front);
@@ -286,12 +292,14 @@ double Principled::pdf_from(bool front, const Vec3d& n, const Vec3d& wi, const V
     const double visible = with_facets(n, at, [&](const auto& facets) {
       return facets.density(n, m, dot(n, m)) * (m2 * m2) * facets.exact_masking_over_cos(wi, cos_i);
     });
-    return share.passed * visible * index * index * -(i_m * o_m) / (sum * sum);
+    const FacetSide side = facet_side(front, i_m / std::sqrt(m2), at);
+    return share.main * side.passing() * visible * index * index * -(i_m * o_m) / (sum * sum);
   }
   const double glossy = with_facets(n, at, [&](const auto& facets) {
     return Reflection<double, std::decay_t<decltype(facets)>>(facets, n, wi, wo).pdf();
   });
-  double pdf = share.diffuse * cos_o / kPi + share.reflected * glossy;
+  const double reflected = share.main * facet_side(front, 0.5 * length(wi + wo), at).reflecting();
+  double pdf = share.diffuse * cos_o / kPi + reflected * glossy;
   if (share.clearcoat > 0) {
     // D (n.h) per solid angle of h, which reflection divides by 4 (wi.h).
     const Vec3d m = wi + wo;
@@ -304,9 +312,8 @@ double Principled::pdf_from(bool front, const Vec3d& n, const Vec3d& wi, const V
 
 std::optional<Vec3d> Principled::sample_from(bool front, const Vec3d& n, const Vec3d& wi, double u1,
                                              double u2, const Rgb<double>* at) const {
-  const double cos_i = dot(n, wi);
-  if (!(cos_i > 0)) return std::nullopt;
-  const Shares share = shares(front, cos_i, at);
+  if (!(dot(n, wi) > 0)) return std::nullopt;
+  const Shares share = shares(front, at);
   if (u1 < share.diffuse) return sample_cosine(n, u1 / share.diffuse, u2);
   u1 -= share.diffuse;
   if (u1 < share.clearcoat) {
@@ -321,16 +328,17 @@ std::optional<Vec3d> Principled::sample_from(bool front, const Vec3d& n, const V
   }
   u1 -= share.clearcoat;
   return with_facets(n, at, [&](const auto& facets) -> std::optional<Vec3d> {
-    if (u1 < share.reflected || share.passed == 0) {
-      return microfacet::sample_reflection(facets, n, wi, std::min(u1 / share.reflected, 1.0), u2);
-    }
-    const double u = std::min((u1 - share.reflected) / share.passed, 1.0);
+    const double main = std::min(u1 / share.main, 1.0);
+    if (!passes()) return microfacet::sample_reflection(facets, n, wi, main, u2);
+    const FacetDigit u(main);
     const Frame frame = facets.frame(n);
-    const Vec3d h = normalize(frame.to_world(facets.visible(frame.to_local(wi), u, u2)));
-    const double index = eta<double>(front);
-    const Fresnel<double> f = fresnel_dielectric<double>(dot(wi, h), index);
-    if (f.total) return std::nullopt;
-    const Vec3d wo = refracted(wi, h, index, f.cos_t);
+    const Vec3d h = normalize(frame.to_world(facets.visible(frame.to_local(wi), u.rest, u2)));
+    const double cos_h = dot(wi, h), index = eta<double>(front);
+    if (facet_side(front, cos_h, at).reflects(u.digit)) {
+      const Vec3d wo = reflected(wi, h);
+      return dot(n, wo) > 0 ? std::optional(wo) : std::nullopt;
+    }
+    const Vec3d wo = refracted(wi, h, index, fresnel_dielectric<double>(cos_h, index).cos_t);
     return dot(n, wo) < 0 ? std::optional(wo) : std::nullopt;
   });
 }

@@ -125,7 +125,7 @@ class RoughDielectric final : public SidedBsdf {
   S eta_of(bool front) const {
     return front ? as<S>(eta_) : 1.0 / as<S>(eta_);
   }
-  double reflected_share(bool front, double cos_i, const Rgb<double>* at) const;
+  FacetSide facet_side(bool front, double cos_h, const Rgb<double>* at) const;
 
   Rgb<double> eval_from(bool front, const Vec3<double>& n, const Vec3<double>& wi,
                         const Vec3<double>& wo, const Rgb<double>* at) const override {
@@ -173,17 +173,11 @@ Rgb<S> RoughDielectric::evaluate(bool front, const Vec3<S>& n, const Vec3<S>& wi
                      : specular_transmittance_.of(at) * (common * (1.0 - f));
 }
 
-// Of the visible facets' light about that of the one they lean to: grazing rays see facets that are
-// turned towards them by about their roughness. Neither lobe is left out where it is dim, as its
-// derivative need not be small. Not tuned.
-double RoughDielectric::reflected_share(bool front, double cos_i, const Rgb<double>* at) const {
-  const double a = std::min(1.0, alpha(at)), square = cos_i * cos_i;
-  const double f =
-      fresnel_dielectric(std::sqrt(square + a * a * (1 - square)), eta_of<double>(front)).reflected;
-  const double reflects = f * luminance(specular_reflectance_.of(at));
-  const double passes = (1 - f) * luminance(specular_transmittance_.of(at));
-  const double sum = reflects + passes;
-  return sum > 0 ? std::clamp(reflects / sum, 0.1, 0.9) : 0.5;
+FacetSide RoughDielectric::facet_side(bool front, double cos_h, const Rgb<double>* at) const {
+  const double f = fresnel_dielectric(cos_h, eta_of<double>(front)).reflected;
+  const double passes = 1 - f;  // 0 only where nothing can
+  return {f * luminance(specular_reflectance_.of(at)),
+          passes > 0 ? std::max(passes * luminance(specular_transmittance_.of(at)), 1e-300) : 0};
 }
 
 double RoughDielectric::pdf_from(bool front, const Vec3d& n, const Vec3d& wi, const Vec3d& wo,
@@ -192,30 +186,24 @@ double RoughDielectric::pdf_from(bool front, const Vec3d& n, const Vec3d& wi, co
   const Facets<double> facets = this->facets(at);
   const Facet<double> facet(facets, n, wi, wo, eta);
   if (!facet.possible) return 0;
-  const double share = reflected_share(front, facet.cos_i, at);
+  const FacetSide side = facet_side(front, facet.cos_h, at);
   return facet.d * facets.exact_masking_over_cos(facet.cos_i) *
-         (facet.above ? share : (1 - share) * (eta * eta));
+         (facet.above ? side.reflecting() : side.passing() * (eta * eta));
 }
 
 std::optional<Vec3d> RoughDielectric::sample_from(bool front, const Vec3d& n, const Vec3d& wi,
                                                   double u1, double u2,
                                                   const Rgb<double>* at) const {
-  const double cos_i = dot(n, wi);
-  if (!(cos_i > 0)) return std::nullopt;
-  const double share = reflected_share(front, cos_i, at);
-  const bool above = u1 < share;
+  if (!(dot(n, wi) > 0)) return std::nullopt;
   const Frame frame(n);
   const Vec3d v = frame.to_local(wi);
-  const double rest = above ? u1 / share : (u1 - share) / (1 - share);
-  const Vec3d h = normalize(facets(at).visible(v, rest, u2));
-  Vec3d wo = reflected(v, h);
-  if (!above) {
-    const double eta = eta_of<double>(front);
-    const auto f = fresnel_dielectric(dot(v, h), eta);
-    if (f.total) return std::nullopt;
-    wo = refracted(v, h, eta, f.cos_t);
-  }
-  wo = normalize(frame.to_world(wo));
+  const FacetDigit u(u1);
+  const Vec3d h = normalize(facets(at).visible(v, u.rest, u2));
+  const double cos_h = dot(v, h), eta = eta_of<double>(front);
+  const bool above = facet_side(front, cos_h, at).reflects(u.digit);
+  const Vec3d local =
+      above ? reflected(v, h) : refracted(v, h, eta, fresnel_dielectric(cos_h, eta).cos_t);
+  const Vec3d wo = normalize(frame.to_world(local));
   if ((dot(n, wo) > 0) != above || dot(n, wo) == 0) return std::nullopt;
   return wo;
 }

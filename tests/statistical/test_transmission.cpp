@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 
 #include "limn/core/rng.h"
@@ -173,6 +174,33 @@ TEST(Transmission, NearlySmoothGlassKeepsAllEnergy) {
 }
 
 // f(wi, wo) cos_i eta_o^2 = f(wo, wi) cos_o eta_i^2 with f over the cosine, between the two sides.
+// A facet reflects or passes about as much as it is drawn to, so that paths within glass keep their
+// weight: 0.1 against 0.1125, the most that rounds to it, and a Beckmann lobe's fitted masking.
+TEST(Transmission, NoSampleOfGlassWeighsMoreThanItsPart) {
+  std::vector<std::shared_ptr<Bsdf>> glass{
+      make("principled", {{"spec_trans", 1.0}, {"roughness", 0.6}, {"base_color", 1.0}})};
+  for (const std::string distribution : {"ggx", "beckmann"}) {
+    glass.push_back(make("roughdielectric", {{"alpha", 0.4}, {"distribution", distribution}}));
+  }
+  Rng rng(2, 4, 6);
+  for (const auto& bsdf : glass) {
+    for (const bool front : {true, false}) {
+      const Bsdf& of = *bsdf->side(front);
+      double most = 0;
+      for (int i = 0; i < 20000; ++i) {
+        const Vec3d wi = around(kNormal, 1.5 * rng.uniform(), 6 * rng.uniform());
+        const double u1 = rng.uniform();
+        const auto wo = of.sample(kNormal, wi, u1, rng.uniform());
+        if (!wo) continue;
+        const bool passes = dot(kNormal, *wo) < 0;
+        const BsdfValue f = of.eval_with_pdf(kNormal, wi, *wo);
+        most = std::max(most, f.value.g / f.pdf * (passes ? std::pow(of.eta(), 2) : 1));
+      }
+      EXPECT_LT(most, 1.14) << bsdf->describe() << front;
+    }
+  }
+}
+
 TEST(Transmission, IsReciprocal) {
   for (const Side& side : sides()) {
     if (!side.of().lobes().below) continue;
@@ -232,7 +260,14 @@ TEST(Transmission, DerivativesMatchDifferences) {
   }
 }
 
+// True if slopes to both sides differ: the facet is near its critical angle.
+bool is_kinked(const std::function<double(double)>& f, double step) {
+  const double left = f(0) - f(-step), right = f(step) - f(0);
+  return std::fabs(right - left) > 0.5 * std::max(std::fabs(left), std::fabs(right));
+}
+
 TEST(Transmission, DerivativesOfParametersMatchDifferences) {
+  int kinks = 0;
   for (const Side& side : sides()) {
     const auto moved = side.bsdf->clone();
     const Bsdf& of = *moved->side(side.front);
@@ -254,6 +289,10 @@ TEST(Transmission, DerivativesOfParametersMatchDifferences) {
           for (Dual* v : parameter.values) v->v -= t;
           return value;
         };
+        if (is_kinked(at, 1e-3)) {
+          ++kinks;
+          continue;
+        }
         const double expected = difference(at, 5e-4);
         EXPECT_NEAR(f.g.d[1], expected, 1e-5 * (f.g.v + std::fabs(expected)))
             << side.name << " " << parameter.name;
@@ -261,6 +300,7 @@ TEST(Transmission, DerivativesOfParametersMatchDifferences) {
       for (Dual* v : parameter.values) v->v -= offset;
     }
   }
+  EXPECT_LE(kinks, 3);
 }
 
 }  // namespace
