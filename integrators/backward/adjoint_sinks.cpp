@@ -21,10 +21,9 @@ void VertexAdjoint::add(const Rgb<double>& amount) {
   if (log()) log()->push_back(fmt::format("    adds with weight {:.6g}", weight));
 }
 
-bool FilmPointAdjoint::at(double x, double y) {
-  x_ = x;
-  y_ = y;
-  adjoint_ = film_.at(x, y);
+bool FilmPointAdjoint::at(const FilmPlace& place) {
+  place_ = place;
+  adjoint_ = film_.at(place.x, place.y);
   return asked_ = !is_black(adjoint_);
 }
 
@@ -38,7 +37,7 @@ void FilmPointAdjoint::add(const Rgb<double>& amount) {
   const double weight = weighed(adjoint_, amount) * form_->scale * share_;
   motion_.contribute(tape_, seeds_, *form_, weight);
   if (motion_.slots().camera == 0) return;
-  const auto ray = camera_leaves(motion_.scene().camera).ray(x_, y_);
+  const auto ray = ray_at(camera_leaves(motion_.scene().camera), place_);
   const Vec3d g = form_->of_ray() * weight;
   seeds_.add(ray.origin, g);
   seeds_.add(ray.direction, g * form_->distance);
@@ -52,14 +51,14 @@ void FilmPointAdjoint::add_line(const FilmLineSample& line, const Rgb<double>& j
     add_clip(line, weighed(adjoint_, jump) * share_ / line.density);
     return;
   }
-  const Camera& camera = motion_.scene().camera;
+  const CameraView<Dual> view = CameraView<Dual>(motion_.scene().camera).at(place_.lens);
   const auto [a, b] = line.mesh->edge(line.edge.edge).vertices;
   BoundaryForm form;
   form.x = line.mesh->position(a) * (1 - line.t) + line.mesh->position(b) * line.t;
-  form.distance = length(form.x - value(camera.origin));
+  const Vec3<Dual> x{{form.x.x, {1, 0, 0, 0}}, {form.x.y, {0, 1, 0, 0}}, {form.x.z, {0, 0, 1, 0}}};
+  form.distance = length(form.x - value(view.start_of(x)));
   form.scale = 1 / line.density;
-  const auto at = camera.project(
-      Vec3<Dual>{{form.x.x, {1, 0, 0, 0}}, {form.x.y, {0, 1, 0, 0}}, {form.x.z, {0, 0, 1, 0}}});
+  const auto at = view.project(x);
   Vec3d g;
   for (int k = 0; k < 3; ++k) g[k] = line.nx * at.x.d[k] + line.ny * at.y.d[k];
   form.add_edge(*line.mesh, line.edge, line.t, g);
@@ -96,7 +95,7 @@ Vec3<Var> clip_point(const Scene& scene, const CameraView<Var>& view, const Clip
 
 // The cut moves with the camera and the face: that is easier on the tape.
 void FilmPointAdjoint::add_clip(const FilmLineSample& line, double weight) {
-  const CameraView<Var> view = camera_leaves(motion_.scene().camera);
+  const CameraView<Var> view = camera_leaves(motion_.scene().camera).at(place_.lens);
   const auto position = view.project(clip_point(motion_.scene(), view, *line.clip, line.t));
   seeds_.add(position.x.node, weight * line.nx);
   seeds_.add(position.y.node, weight * line.ny);

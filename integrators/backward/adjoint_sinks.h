@@ -44,11 +44,10 @@ class FilmPointAdjoint final : public FilmSink {
   // Whether its pixels have an adjoint, and whether it added something.
   bool asked() const { return asked_; }
   bool added() const { return added_; }
-  double x() const { return x_; }
-  double y() const { return y_; }
+  const FilmPlace& place() const { return place_; }
   const Seeds& seeds() const { return seeds_; }
 
-  bool at(double x, double y) override;
+  bool at(const FilmPlace& place) override;
   bool takes(const BoundaryForm& form, const Rng& key) override;
   void add(const Rgb<double>& amount) override;
   void add_line(const FilmLineSample& line, const Rgb<double>& jump) override;
@@ -62,7 +61,7 @@ class FilmPointAdjoint final : public FilmSink {
   Tape& tape_;
   Seeds seeds_;
   TermCost own_;
-  double x_ = 0, y_ = 0;
+  FilmPlace place_;
   Rgb<double> adjoint_;
   bool asked_ = true, added_ = false;
   const BoundaryForm* form_ = nullptr;

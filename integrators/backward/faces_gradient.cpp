@@ -13,7 +13,7 @@ namespace limn {
 
 FacesGradient::FacesGradient(const Scene& scene, const Image& adjoint,
                              const BackwardOptions& options, int threads)
-    : adjoint_((check_faces_film(scene.film), adjoint_pixels(scene, adjoint))),
+    : adjoint_((check_faces_film(scene), adjoint_pixels(scene, adjoint))),
       parameters_(scene, reverse_parameters(scene, options)),
       faces_(std::make_shared<CoincidentFaces>(parameters_.scene(), threads)),
       pixels_(parameters_.scene(), *faces_, threads, kFacesUser),

@@ -11,9 +11,6 @@ namespace limn {
 
 std::vector<Parameter> reverse_parameters(const Scene& scene, const BackwardOptions& options) {
   if (!options.found.empty()) return options.found;
-  if (scene.camera.is_orthographic()) {
-    throw InputError({scene.file}, "orthographic: there are images, no derivatives");
-  }
   std::vector<Parameter> parameters;
   if (options.parameters.empty()) {
     parameters = list_parameters(scene);
@@ -52,8 +49,10 @@ std::vector<std::shared_ptr<Bsdf>> scatterers(const Scene& scene) {
 }
 
 std::array<Dual*, kCameraSlots> camera_numbers(Camera& c) {
-  return {&c.origin.x, &c.origin.y, &c.origin.z,  &c.left.x,    &c.left.y,    &c.left.z, &c.up.x,
-          &c.up.y,     &c.up.z,     &c.forward.x, &c.forward.y, &c.forward.z, &c.fov};
+  return {&c.origin.x, &c.origin.y,        &c.origin.z,      &c.left.x,
+          &c.left.y,   &c.left.z,          &c.up.x,          &c.up.y,
+          &c.up.z,     &c.forward.x,       &c.forward.y,     &c.forward.z,
+          &c.fov,      &c.aperture_radius, &c.focus_distance};
 }
 
 // Copies of an object whose lanes carry its parameters with a slot, four of them each.

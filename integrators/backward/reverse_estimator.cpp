@@ -143,9 +143,9 @@ class ReverseEstimator::VertexAdjoints {
 };
 
 // Moves with the camera where that has slots.
-CameraRay<Var> ReverseEstimator::moving_ray(const FilmPosition& film,
+CameraRay<Var> ReverseEstimator::moving_ray(const FilmPlace& film,
                                             const CameraRay<double>& ray) const {
-  if (parameters_.slots().camera != 0) return camera_leaves(scene().camera).ray(film.x, film.y);
+  if (parameters_.slots().camera != 0) return ray_at(camera_leaves(scene().camera), film);
   const Vec3d &o = ray.origin, &d = ray.direction;
   return {{o.x, o.y, o.z}, {d.x, d.y, d.z}, ray.t_min, ray.t_max};
 }
@@ -170,9 +170,10 @@ bool ReverseEstimator::trace(const Path& path, const Rng& key, Tape& tape, Gradi
   for (int i = 0; i < places; ++i) {
     FilmPosition film = sample_pixel_filter(scene().film, filter_, at.x, at.y, key);
     if (i > 0) film = mirrored_in_pixel(scene().film, at.x, at.y, film);
-    const auto still = scene().camera.ray<double>(film.x, film.y);
+    const FilmPlace place{film, sample_lens(scene().camera, key)};
+    const auto still = ray_at(CameraView<double>(scene().camera), place);
     if (to.log) log_camera_ray(*to.log, film.x, film.y, still.origin, still.direction);
-    const auto ray = moving_ray(film, still);
+    const auto ray = moving_ray(place, still);
     RayCount rays;
     ++cost.samples;
     PathTracer<Var, VertexAdjoints> tracer(traced_.context(), rays);
@@ -234,7 +235,8 @@ bool ReverseEstimator::trace(size_t slot, const FilmDraw& draw, Tape& tape,
   }
   cost.rays += point.cost().rays;
   cost.shadow_rays += point.cost().shadow_rays;
-  if (to.log) to.log->push_back(fmt::format("film point ({:.6f}, {:.6f})", point.x(), point.y()));
+  if (to.log)
+    to.log->push_back(fmt::format("film point ({:.6f}, {:.6f})", point.place().x, point.place().y));
   if (!point.added()) {
     ++(point.asked() ? cost.occluded : cost.zero_weight);
     return true;

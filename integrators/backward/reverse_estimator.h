@@ -61,8 +61,7 @@ class ReverseEstimator final : public GradientEstimator {
   double film_points(size_t slot) const {
     return types_[slot]->on_film_alone() ? camera_samples() : options_.shadow_samples;
   }
-  CameraRay<Var> moving_ray(const Camera::FilmPoint<double>& film,
-                            const CameraRay<double>& ray) const;
+  CameraRay<Var> moving_ray(const FilmPlace& film, const CameraRay<double>& ray) const;
   // The path of a pixel. expected: how many paths it has in the batch, on average.
   struct Path {
     PixelSample at;

@@ -58,8 +58,9 @@ bool closest_from_edge(const RayTracer& tracer, const Scene& scene, const FacesA
 bool closest_at_edge(const RayTracer& tracer, const Scene& scene, const FacesAround& around,
                      const Vec3d& y, double distance, const Ray& ray, Hit& hit) {
   // Near faces are those that rays from the camera, or from no farther away, cannot tell.
-  if (distance > length(y - value(scene.camera.origin)) && distance > ray.t_min &&
-      distance < ray.t_max)
+  const Camera& camera = scene.camera;
+  if (distance > length(y - value(camera.origin)) + camera.aperture_radius.v &&
+      distance > ray.t_min && distance < ray.t_max)
     return closest_from_edge(tracer, scene, around, y, distance, ray, hit);
   const bool found = tracer.closest(ray, hit);
   if (around.near.empty()) return found;

@@ -165,21 +165,35 @@ LightOrigin Viewpoint::aside(const Vec3d& y, double by) const {
 }
 
 Facing Viewpoint::facing(const EdgeMesh& mesh, FaceId face) const {
-  const Plane& plane = mesh.plane(face);
-  if (!is_edge_on({mesh.shape, face})) return limn::facing(mesh, face, value(origin_.v));
-  const bool front = dot(plane.n, aside_) > 0;
+  const Vec3d v = value(origin_.v), &n = mesh.plane(face).n;
+  const bool edge_on = is_edge_on({mesh.shape, face});
+  if (!edge_on && !origin_.infinite) return limn::facing(mesh, face, v);
+  const bool front = edge_on ? dot(n, aside_) > 0 : dot(n, v) < 0;
   return {front, !front};
 }
 
 bool Viewpoint::is_candidate(const EdgeMesh& mesh, EdgeId id) const {
   const Edge& edge = mesh.edge(id);
-  if (edge_on_count_ == 0) return limn::is_candidate(mesh, id, value(origin_.v));
+  if (edge_on_count_ == 0 && !origin_.infinite) {
+    return limn::is_candidate(mesh, id, value(origin_.v));
+  }
   const Facing first = facing(mesh, edge.faces[0]);
   const FaceId second = edge.faces[1];
   return limn::is_candidate(mesh, id, first, second.valid() ? facing(mesh, second) : first);
 }
 
-Viewpoints::Viewpoints(const Scene& scene) : camera(scene, {scene.camera.origin}) {
+namespace {
+
+Viewpoint viewpoint_of(const Scene& scene) {
+  const Camera& camera = scene.camera;
+  if (camera.has_lens()) return Viewpoint(value(camera.origin));
+  return {scene, camera.is_orthographic() ? LightOrigin{camera.forward, true}
+                                          : LightOrigin{camera.origin}};
+}
+
+}  // namespace
+
+Viewpoints::Viewpoints(const Scene& scene) : camera(viewpoint_of(scene)) {
   for (const auto& light : scene.delta_lights) {
     numbers.emplace(light.get(), lights.size());
     lights.emplace_back(scene, light->origin());

@@ -1,6 +1,6 @@
 #pragma once
-// A place from which edges are listed once, the camera's pinhole or a delta light, and the faces
-// that are seen edge-on from there.
+// A place from which edges are listed once, and the faces that are seen edge-on from there: the
+// camera's pinhole, an orthographic camera (at infinity) or a delta light.
 #include <unordered_map>
 #include <vector>
 
@@ -24,6 +24,8 @@ inline constexpr double kEdgeOn = 0x1p-18;
 class Viewpoint {
  public:
   Viewpoint(const Scene& scene, const LightOrigin& origin);
+  // One of many, of which almost none sees a face edge-on: the center of a lens.
+  explicit Viewpoint(const Vec3d& center) : origin_{{center.x, center.y, center.z}}, aside_{} {}
 
   // How many flat-shaded faces are seen edge-on, and whose is the first of them. (In the plane of
   // some face of a finely tessellated smooth surface a viewpoint lies by chance, and the kink is as
@@ -45,8 +47,7 @@ class Viewpoint {
   LightOrigin hardly_aside(const Vec3d& y) const;
   // The unit direction in which light from there arrives at y, turned around.
   Vec3d towards(const Vec3d& y) const;
-  // limn::is_candidate, of a viewpoint that is not at infinity; faces seen edge-on are turned as
-  // they are from aside.
+  // limn::is_candidate; faces seen edge-on are turned as they are from aside.
   bool is_candidate(const EdgeMesh& mesh, EdgeId edge) const;
 
  private:

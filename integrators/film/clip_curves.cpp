@@ -57,12 +57,11 @@ std::vector<ClipSegment> find_clip_segments(const Scene& scene) {
   return segments;
 }
 
-bool clip_difference(const PathContext& context, const ClipSegment& segment, const Vec3d& y,
-                     const Rng& key, RayCount& rays, Rgb<double>& jump) {
+bool clip_difference(const PathContext& context, const ClipSegment& segment, const Vec3d& from,
+                     const Vec3d& y, const Rng& key, RayCount& rays, Rgb<double>& jump) {
   const Scene& scene = context.scene;
-  const Vec3d pinhole = value(scene.camera.origin);
-  const double distance = length(y - pinhole);
-  Ray ray{pinhole, (y - pinhole) / distance};
+  const double distance = length(y - from);
+  Ray ray{from, (y - from) / distance};
   const double cosine = dot(ray.direction, value(scene.camera.forward));
   ray.skip_emitters = scene.hide_emitters;
   Hit cut{segment.face, distance};
@@ -80,7 +79,7 @@ bool clip_difference(const PathContext& context, const ClipSegment& segment, con
   const Rng side_key = key.at(Purpose::kEdgeSide, 0);  // of both sides, as in edge_difference
   const auto leaving = [&](FaceRef face) {
     Walk<double, NoVisitor> walk(side_key, 0, nullptr);
-    path.place(walk, surface_on_ray<double>(scene, face, pinhole, ray.direction), -ray.direction);
+    path.place(walk, surface_on_ray<double>(scene, face, from, ray.direction), -ray.direction);
     path.follow_one(walk);
     return walk.radiance();
   };

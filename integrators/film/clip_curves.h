@@ -18,9 +18,10 @@ struct ClipSegment {
 
 std::vector<ClipSegment> find_clip_segments(const Scene& scene);
 
-// Estimates the radiance that arrives at the pinhole from where the face is cut off, just beside
-// the point `y` of the segment, minus that where the face is seen. False if y is hidden.
-bool clip_difference(const PathContext& context, const ClipSegment& segment, const Vec3d& y,
-                     const Rng& key, RayCount& rays, Rgb<double>& jump);
+// Estimates the radiance that arrives at the camera from where the face is cut off, just beside the
+// point `y` of the segment, minus that where the face is seen. from: where the camera's ray to y
+// starts. False if y is hidden.
+bool clip_difference(const PathContext& context, const ClipSegment& segment, const Vec3d& from,
+                     const Vec3d& y, const Rng& key, RayCount& rays, Rgb<double>& jump);
 
 }  // namespace limn

@@ -3,21 +3,23 @@
 // camera's rays.
 #include <optional>
 
+#include "integrators/paths/camera_path.h"
 #include "integrators/paths/path.h"
 
 namespace limn {
 
 struct FilmPoint {
-  double x, y;          // film position [pixels of the full film]
+  FilmPlace at;
   CameraRay<Dual> ray;  // through it
   Vec3d omega;          // its unit direction
   double distance;      // along it
 };
 
-// Where a point of a face is on the film, if nothing hides it. None where no pixel can use it:
-// outside the film and the filter around it, before or behind the clip planes, on an emitter that
-// the camera does not see.
-std::optional<FilmPoint> film_point(const Scene& scene, FaceRef face, const Vec3d& x);
+// Where a point of a face is on the film, as seen through this point of a lens, if nothing hides it.
+// None where no pixel can use it: outside the film and the filter around it, before or behind the
+// clip planes, on an emitter that the camera does not see.
+std::optional<FilmPoint> film_point(const Scene& scene, FaceRef face, const Vec3d& x,
+                                    const LensPoint& lens);
 // The same seen at x, a point nearby.
 inline FilmPoint aimed_at(FilmPoint point, const Vec3d& x) {
   const Vec3d way = x - value(point.ray.origin);
@@ -25,13 +27,14 @@ inline FilmPoint aimed_at(FilmPoint point, const Vec3d& x) {
   point.omega = way / point.distance;
   return point;
 }
-// The camera's ray through a film position, at rest but for that, which moves by a pixel along x in
-// lane 0, and along y in lane 1.
+// The ray of a camera without a lens through a film position, at rest but for that, which moves by
+// a pixel along x in lane 0, and along y in lane 1.
 CameraRay<Dual> shifted_ray(const Camera& camera, double x, double y);
 // One shadow ray.
 bool is_hidden(const PathContext& context, const FilmPoint& point, FaceRef face, RayCount& rays);
 
-// How much film a direction takes [pixels^2 / sr].
-double film_per_solid_angle(const Camera& camera, const Vec3d& omega);
+// How much film a direction takes [pixels^2 / sr]. Of an orthographic camera: solid angle as seen
+// from the distance along the ray.
+double film_per_solid_angle(const Camera& camera, const Vec3d& omega, double distance);
 
 }  // namespace limn

@@ -15,7 +15,7 @@ constexpr RegionsUser kUser{"the exact film", "film \"rays\""};
 
 }  // namespace
 
-void FilmRegions::check(const Film& film) { PixelRegions::check(film, kUser); }
+void FilmRegions::check(const Scene& scene) { PixelRegions::check(scene, kUser); }
 
 FilmRegions::FilmRegions(const Scene& scene, int threads, const std::atomic<bool>* interrupted)
     : film_(scene.film) {

@@ -17,7 +17,7 @@ class FilmRegions {
   // The scene must outlive it. Empty if interrupted meanwhile (null: never). InputError, with the
   // filter's place, unless the filter is a box.
   FilmRegions(const Scene& scene, int threads, const std::atomic<bool>* interrupted = nullptr);
-  static void check(const Film& film);  // the filter
+  static void check(const Scene& scene);  // PixelRegions::check
   // What it had to find of the scene's faces, for a tracer to share.
   std::shared_ptr<const CoincidentFaces> faces() const { return faces_; }
 

@@ -87,7 +87,14 @@ class PixelLists {
 
 }  // namespace
 
-void PixelRegions::check(const Film& film, const RegionsUser& user) {
+void PixelRegions::check(const Scene& scene, const RegionsUser& user) {
+  const Film& film = scene.film;
+  if (!scene.camera.is_pinhole()) {
+    throw InputError({scene.file},
+                     fmt::format("{} needs a pinhole, a sensor of type \"perspective\" ({} takes "
+                                 "every sensor)",
+                                 user.name, user.instead));
+  }
   if (film.filter.kind == Filter::Kind::kBox && film.filter.radius == 0.5) return;
   throw InputError(film.where,
                    fmt::format("{} needs a box filter, <rfilter type=\"box\"/>: a pixel is what is "
@@ -97,7 +104,7 @@ void PixelRegions::check(const Film& film, const RegionsUser& user) {
 
 PixelRegions::PixelRegions(const Scene& scene, const CoincidentFaces& faces, int threads,
                            const RegionsUser& user)
-    : scene_((check(scene.film, user), scene)),
+    : scene_((check(scene, user), scene)),
       copies_(faces.copies),
       overlaps_(faces.overlaps),
       user_(user),

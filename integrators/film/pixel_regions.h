@@ -24,10 +24,10 @@ struct RegionsUser {
 class PixelRegions {
  public:
   // Finds which faces may be seen in which tile of make_tiles(). Scene and faces must outlive it.
-  // InputError, with the filter's place, unless the filter is a box.
+  // InputError unless the filter is a box, with its place, and the camera a pinhole.
   PixelRegions(const Scene& scene, const CoincidentFaces& faces, int threads,
                const RegionsUser& user);
-  static void check(const Film& film, const RegionsUser& user);  // the filter
+  static void check(const Scene& scene, const RegionsUser& user);
 
   const std::vector<Tile>& tiles() const { return tiles_; }
   // Which of tiles() a pixel of the crop is in.

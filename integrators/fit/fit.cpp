@@ -31,7 +31,9 @@ std::vector<double> camera_numbers(const Camera& camera) {
   for (const Vec3<Dual>* v : camera_vectors(copy)) {
     for (int k = 0; k < 3; ++k) numbers.push_back((*v)[k].v);
   }
-  numbers.push_back(copy.fov.v);
+  for (const Dual* v : {&copy.fov, &copy.aperture_radius, &copy.focus_distance}) {
+    numbers.push_back(v->v);
+  }
   return numbers;
 }
 
@@ -40,7 +42,9 @@ void set_camera(Camera& camera, const std::vector<double>& numbers) {
   for (Vec3<Dual>* v : camera_vectors(camera)) {
     for (int k = 0; k < 3; ++k) (*v)[k].v = numbers[next++];
   }
-  camera.fov.v = numbers[next];
+  for (Dual* v : {&camera.fov, &camera.aperture_radius, &camera.focus_distance}) {
+    v->v = numbers[next++];
+  }
 }
 
 [[noreturn]] void refuse_state() {
@@ -394,7 +398,7 @@ void Fit::Impl::check_state(const FitState& state) const {
   for (size_t v = 0; v < views.size(); ++v) {
     const FitState::View& view = state.views[v];
     const std::vector<ShapeId> shapes = moved_shapes(v);
-    check(view.camera.size() == 13 && view.shapes.size() == shapes.size() &&
+    check(view.camera.size() == 15 && view.shapes.size() == shapes.size() &&
           view.values.size() == parameters_.size());
     for (size_t i = 0; i < parameters_.size(); ++i) {
       check(view.values[i].size() == values_in(v, parameters_[i]).size());

@@ -11,7 +11,7 @@
 
 namespace limn {
 
-void check_faces_film(const Film& film) { PixelRegions::check(film, kFacesUser); }
+void check_faces_film(const Scene& scene) { PixelRegions::check(scene, kFacesUser); }
 
 struct FacesEstimator::Group {
   // all: the scene without the group's tangents.
@@ -32,7 +32,7 @@ struct FacesEstimator::Group {
 
 FacesEstimator::FacesEstimator(const Scene& scene, std::span<const Parameter> parameters,
                                int threads)
-    : scene_((check_faces_film(scene.film), scene)),
+    : scene_((check_faces_film(scene), scene)),
       lanes_(static_cast<int>(std::min<size_t>(parameters.size(), kLanes))),
       faces_(std::make_shared<CoincidentFaces>(scene, threads)),
       pixels_(scene, *faces_, threads, kFacesUser),

@@ -19,7 +19,7 @@ inline constexpr RegionsUser kFacesUser{"a film seen by its faces", "points \"ra
                                         kPixelMargin};
 
 // InputError unless the film has a box filter.
-void check_faces_film(const Film& film);
+void check_faces_film(const Scene& scene);
 
 // A pixel has one sample. Slot g holds the derivatives for the parameters from g
 // kLanes on; without parameters there is one slot without derivatives.

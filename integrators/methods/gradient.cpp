@@ -64,13 +64,13 @@ void check_exact_film(const Scene& scene, const Method& method) {
     throw InputError("the exact film is for methods that sample edges on it: the method \"" +
                      method.name() + "\" does not");
   }
-  FilmRegions::check(scene.film);
+  FilmRegions::check(scene);
 }
 
 void check_exact_films(const Scene& scene, const std::vector<Method>& methods) {
   std::vector<std::string> names;
   for (const Method& method : methods) {
-    if (method->terms_can_be_left_out) return FilmRegions::check(scene.film);
+    if (method->terms_can_be_left_out) return FilmRegions::check(scene);
     names.push_back(method.name());
   }
   throw InputError("the exact film is for methods that sample edges on it: none of these does: " +

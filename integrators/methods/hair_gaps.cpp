@@ -89,7 +89,9 @@ class GapFinder {
         once_(scene.shapes.size()),
         closed_(scene.shapes.size()) {
     const Camera& camera = scene.camera;
-    pixel_ = 2 * camera.x_factor * std::tan(value(camera.fov) * M_PI / 360) / camera.width;
+    pixel_ = camera.is_orthographic()
+                 ? 2 * camera.half_width / camera.width
+                 : 2 * camera.x_factor * std::tan(value(camera.fov) * M_PI / 360) / camera.width;
     for (uint32_t s = 0; s < scene.shapes.size(); ++s)
       for (uint32_t f = 0; f < scene.shapes[s].mesh.faces.size(); ++f)
         add_face({ShapeId(s), FaceId(f)});
@@ -101,9 +103,12 @@ class GapFinder {
   Corners corners_of(FaceRef face) const {
     return face_corners<double>(scene_.shape(face.shape).mesh, face.face);
   }
+  double pixel_at(double distance) const {
+    return scene_.camera.is_orthographic() ? pixel_ : pixel_ * distance;
+  }
   // Of gaps that are met by one sample, with this distance from the camera and this length.
   double widest(double distance, double length) const {
-    const double pixel = pixel_ * distance;
+    const double pixel = pixel_at(distance);
     return pixel * pixel / (spp_ * length);
   }
   void add_face(FaceRef face) {
@@ -244,14 +249,14 @@ class GapFinder {
     const double last = height0 + to * (height1 - height0);
     if (first * last <= 0 || std::min(std::fabs(first), std::fabs(last)) <= rounding)
       return std::nullopt;
-    const double pixel = pixel_ * length(a + middle * (b - a) - eye_);
+    const double pixel = pixel_at(length(a + middle * (b - a) - eye_));
     return Beside{std::fabs(height) / pixel, height, (to - from) * length(b - a) / pixel};
   }
 
   const Scene& scene_;
   Vec3d eye_;
   double spp_;
-  double pixel_ = 0;  // of the film, at a distance of 1
+  double pixel_ = 0;  // of the film, at a distance of 1; of parallel rays at any
   std::vector<FaceRef> faces_;
   std::vector<FloatBox> boxes_;
   // Of each shape that is asked for: see closed_faces.

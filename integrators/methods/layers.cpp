@@ -92,7 +92,7 @@ class LayerEstimator final : public SampleEstimator {
   void add(const KeyedSample& sample, SampleSink& sink) const {
     const FilmPosition film =
         sample_pixel_filter(scene_.film, filter_, sample.at.x, sample.at.y, sample.key);
-    const auto start = camera_.ray(film.x, film.y);
+    const auto start = sample_ray(camera_, film, sample.key);
     Hit hit;
     if (!tracer_->closest(camera_ray(scene_, start), hit)) return;
     const auto surface = surface_on_ray<double>(scene_, hit.face, start.origin, start.direction);

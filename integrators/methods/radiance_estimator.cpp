@@ -89,7 +89,15 @@ void RadianceEstimator::trace(std::span<const KeyedSample> samples, bool mirrore
     if (mirrored) places[i] = mirrored_in_pixel(scene_.film, at.x, at.y, places[i]);
   }
   std::array<CameraRay<double>, kMostTogether> camera_rays;
-  find_rays(camera_, {places.data(), samples.size()}, camera_rays);
+  if (scene_.camera.has_lens()) {
+    std::array<LensPoint, kMostTogether> lenses;
+    sample_lenses(scene_.camera, samples, lenses);
+    for (size_t i = 0; i < samples.size(); ++i) {
+      camera_rays[i] = ray_at(camera_, {places[i], lenses[i]});
+    }
+  } else {
+    find_rays(camera_, {places.data(), samples.size()}, camera_rays);
+  }
   std::array<StartRay<double>, kMostTogether> starts;
   for (size_t i = 0; i < samples.size(); ++i) {
     const CameraRay<double>& ray = camera_rays[i];

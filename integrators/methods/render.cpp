@@ -50,9 +50,11 @@ std::unique_ptr<SampleEstimator> make_estimator(const Scene& scene, const RunSet
   const ImageMethod& method = *options.method->image;
   const Numbers numbers = numbers_of(options.generator);  // checked for all
   check_points(options.points, method.closed_light, options.method.name());
-  if (scene.camera.is_orthographic() &&
-      (method.looks_around || options.exact_film || options.points == FilmPoints::kFaces)) {
-    throw InputError("orthographic: only rays make images (--method rays, --film rays)");
+  if (method.looks_around && !scene.camera.is_pinhole()) {
+    throw InputError({scene.file},
+                     fmt::format("the method \"{}\" needs a pinhole, a sensor of type "
+                                 "\"perspective\" (\"rays\" takes every sensor)",
+                                 options.method.name()));
   }
   if (!method.looks_around && options.what != RenderWhat::kImage) {
     throw InputError(

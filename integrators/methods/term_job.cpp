@@ -99,7 +99,7 @@ class TermJob {
       : scene_(scene),
         options_(options),
         method_(method),
-        moves_film_(method.moves_film && !options.exact_film),
+        moves_film_(method.moves_film && !options.exact_film && scene.camera.is_pinhole()),
         types_(terms_of(scene, method.sampler, method.closed, moves_film_)) {
     const std::vector<std::string> chosen = selected_terms(term_names(), options.terms, scene.file);
     if (options.samples) check_samples(*options.samples);

@@ -1,5 +1,6 @@
 #pragma once
-// Where a path starts: a position in a pixel's filter, and the camera's ray through it.
+// Where a path starts: a position in a pixel's filter, a point of the lens, and the camera's ray
+// through both.
 #include <array>
 
 #include "limn/core/film.h"
@@ -39,6 +40,42 @@ inline FilmPosition mirrored_in_pixel(const Film& film, int x, int y,
   };
   return {mirrored(film.range_x(x), x + 0.5, position.x),
           mirrored(film.range_y(y), y + 0.5, position.y)};
+}
+
+// The point of the lens that a sample looks through.
+inline LensPoint sample_lens(const Rng& key) {
+  Rng rng = key.at(Purpose::kLens, 0);
+  const double u = rng.uniform();
+  return lens_point(u, rng.uniform());
+}
+// The same for any camera: without a lens its center.
+inline LensPoint sample_lens(const Camera& camera, const Rng& key) {
+  return camera.has_lens() ? sample_lens(key) : LensPoint{};
+}
+
+// The same of many: lenses[i], of the sample with the key items[i].key.
+template <class Items, size_t kMost>
+void sample_lenses(const Camera& camera, const Items& items, std::array<LensPoint, kMost>& lenses) {
+  if (!camera.has_lens()) return;
+  std::array<Rng::Stream, kMost> streams;
+  for (size_t i = 0; i < items.size(); ++i) streams[i] = {&items[i].key, 0};
+  std::array<std::array<double, 2>, kMost> numbers;
+  Rng::draw(Purpose::kLens, {streams.data(), items.size()}, numbers.data());
+  for (size_t i = 0; i < items.size(); ++i) lenses[i] = lens_point(numbers[i][0], numbers[i][1]);
+}
+
+// A position on the film, seen through a point of the lens.
+struct FilmPlace : FilmPosition {
+  LensPoint lens = {};
+};
+template <class S>
+CameraRay<S> ray_at(const CameraView<S>& view, const FilmPlace& at) {
+  return view.camera().has_lens() ? view.at(at.lens).ray(at.x, at.y) : view.ray(at.x, at.y);
+}
+// The ray of the sample with this key.
+template <class S>
+CameraRay<S> sample_ray(const CameraView<S>& view, const FilmPosition& at, const Rng& key) {
+  return ray_at(view, FilmPlace{at, sample_lens(view.camera(), key)});
 }
 
 // The primal camera ray.

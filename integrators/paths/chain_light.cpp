@@ -31,7 +31,7 @@ ChainLight find_chain_light(const PathContext& context, uint64_t seed) {
     const int x = film.crop_x + static_cast<int>(rng.uniform() * film.crop_width);
     const int y = film.crop_y + static_cast<int>(rng.uniform() * film.crop_height);
     const FilmPosition at = sample_pixel_filter(film, filter, x, y, key);
-    const CameraRay<double> ray = camera.ray(at.x, at.y);
+    const CameraRay<double> ray = sample_ray(camera, at, key);
     const StartRay<double> start{camera_ray(scene, ray), ray.origin, ray.direction};
     Walk<double, NoVisitor> walk(key, 0, nullptr);
     tracer.follow_rays({&start, 1}, {&walk, 1});
@@ -56,10 +56,7 @@ namespace {
 
 // Of a scene without meshes whose first lane is seeded.
 bool values_move(const Scene& seeded) {
-  const Camera& c = seeded.camera;
-  const bool camera = !is_constant(c.origin) || !is_constant(c.left) || !is_constant(c.up) ||
-                      !is_constant(c.forward) || !is_constant(c.fov);
-  if (camera) return true;
+  if (!CameraView<Dual>(seeded.camera).is_constant()) return true;
   for (const auto& light : seeded.delta_lights) {
     if (!is_constant(light->origin().v)) return true;
   }

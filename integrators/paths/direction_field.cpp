@@ -49,10 +49,13 @@ void MotionRates::add_object(const Scene& scene, int lane, double share) {
 
 void MotionRates::add_camera(const Scene& scene, int lane, double share) {
   const Camera& camera = scene.camera;
-  const double speed = length(derivative(camera.origin, lane));
+  // Of a lens, how fast its rim moves, and turns the rays through it.
+  const Dual slope = camera.aperture_radius / camera.focus_distance;
+  const double speed =
+      length(derivative(camera.origin, lane)) + std::fabs(camera.aperture_radius.d[lane]);
   const double rotation = length(derivative(camera.left, lane)) +
                           length(derivative(camera.up, lane)) +
-                          std::fabs(camera.fov.d[lane]) * (kPi / 180);
+                          std::fabs(camera.fov.d[lane]) * (kPi / 180) + std::fabs(slope.d[lane]);
   if (!(speed > 0) && !(rotation > 0)) return;
   sources_.push_back(
       {value(camera.origin), camera.near_clip, share * speed, share * rotation, true});

@@ -121,6 +121,7 @@ inline void PathTracer<S, Visitor>::follow_seen(std::span<const StartRay<S>> ray
       if (walk.failed) continue;
       const Vec3<S>&origin = rays[i].origin, &direction = rays[i].direction;
       if (walk.found) {
+        if constexpr (!std::is_same_v<Visitor, NoVisitor>) walk.step.from = value(origin);
         renew(walk.surface,
               [&] { return surface_on_ray<S>(c_.scene, walk.hit.face, origin, direction); });
         place(walk, -direction);

@@ -18,7 +18,7 @@ namespace limn {
 
 // How a path came to a vertex.
 struct PathStep {
-  Vec3d from;  // the vertex before
+  Vec3d from;  // the vertex before, or where the camera's ray starts
   // Of the direction from there [1/sr]; 0 for what the camera, an edge or a smooth lobe sees.
   double pdf = 0;
 };

@@ -385,13 +385,15 @@ TermEstimator::PathCosts TermEstimator::trace(std::span<const PathStart> places,
   tracer.take_light_samples(plan_.light_samples);
   if (splits_now(twice)) tracer.split_by(&rates_);
   std::array<StartRay<Dual>, Tracer::kMostWalks> starts;
+  std::array<LensPoint, Tracer::kMostWalks> lenses;
+  sample_lenses(scene_.camera, walks, lenses);
   for (size_t i = 0; i < walks.size(); ++i) {
     const PixelSample& at = places[i].at;
     FilmPosition film = sample_pixel_filter(scene_.film, filter_, at.x, at.y, walks[i].key);
     if (places[i].mirrored) film = mirrored_in_pixel(scene_.film, at.x, at.y, film);
     const auto ray = [&] {
       const FilmMotion* motion = plan_.film_motion(at.x, at.y);
-      if (!motion) return camera_.ray(film.x, film.y);
+      if (!motion) return ray_at(camera_, {film, lenses[i]});
       const FilmMotion here = tapered(*motion, scene_.film, at.x, at.y, film.x, film.y);
       return camera_.ray(Dual(film.x, here.x), Dual(film.y, here.y));
     }();

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "integrators/estimates/sample_estimator.h"
+#include "integrators/paths/camera_path.h"
 #include "limn/core/light.h"
 #include "limn/edgetree/edge_sampler.h"
 
@@ -108,7 +109,7 @@ struct FilmLineSample {
 class FilmSink : public BoundarySink {
  public:
   // The film position of the sample, before all else. False if no pixel asks for it.
-  virtual bool at(double x, double y) = 0;
+  virtual bool at(const FilmPlace& place) = 0;
   virtual void add_line(const FilmLineSample& line, const Rgb<double>& jump) = 0;
 };
 

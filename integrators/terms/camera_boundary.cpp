@@ -1,5 +1,5 @@
-// The boundary term of the camera: edges seen from the pinhole, and curves where its clip planes
-// cut faces, listed once, sampled on the film.
+// The boundary term of the camera: edges that it sees, and curves where its clip planes cut faces,
+// listed once, sampled on the film; with a lens, the mean of it over the lens.
 //   dI_j/dtheta  +=  integral along the projected edges of h_j(s) dL v_n dl,
 // with s the film position [pixels], dl its length element, v_n = ds/dtheta . n the normal speed of
 // the projected edge, and dL the radiance behind the normal n minus that before it.
@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "integrators/terms/camera_edges.h"
+#include "integrators/terms/lens_edges.h"
 #include "integrators/terms/term_table.h"
 #include "limn/core/duplicate_faces.h"
 
@@ -16,34 +17,42 @@ namespace {
 class CameraTerm final : public Term {
  public:
   explicit CameraTerm(TermInput& input)
-      : input_(input.edges()),
-        edges_(input.context, input_, input.lanes, input.free, input.visible) {}
+      : input_(input.edges()), has_lens_(input.context.scene.camera.has_lens()) {
+    const PathContext& context = input.context;
+    if (has_lens_) {
+      edges_ = std::make_unique<LensEdges>(context, input_, input.lanes, input.free);
+    } else {
+      edges_ =
+          std::make_unique<CameraEdges>(context, input_, input.lanes, input.free, input.visible);
+    }
+  }
 
-  bool uses_film() const override { return !edges_.empty(); }
+  bool uses_film() const override { return !edges_->empty(); }
   void sample_film(double u, const Rng& key, FilmSink& sink) const override {
-    const FilmEdgePoint point = edges_.choose(u);
-    if (!sink.at(point.x, point.y)) return;
+    const auto drawn = edges_->choose(u, has_lens_ ? sample_lens(key) : LensPoint{});
+    if (!drawn || !sink.at(drawn->at)) return;
+    const FilmEdgePoint& point = *drawn;
     RayCount rays;
     Rgb<double> jump;
-    const bool visible = edges_.jump_at(point, key, rays, jump);
+    const bool visible = edges_->jump_at(point, key, rays, jump);
     sink.cost().add(rays);
     if (!visible) return;
-    const FilmEdge& edge = *point.edge;
+    const FilmEdge& edge = point.edge;
     const Lanes speed = edge.speed0 * (1 - point.s) + edge.speed1 * point.s;
     FilmLineSample line{edge.nx, edge.ny, speed, point.density};
-    line.t = edges_.t_of(point);
+    line.t = edges_->t_of(point);
     if (edge.clip == FilmEdge::kNoClip) {
       line.mesh = &input_.object(edge.id.object);
       line.edge = edge.id;
     } else {
-      line.clip = &edges_.clip_of(edge);
+      line.clip = &edges_->clip_of(edge);
     }
     sink.add_line(line, jump);
   }
-  void move_film(const FilmMotionAt& motion) override { edges_.move_film(motion); }
+  void move_film(const FilmMotionAt& motion) override { edges_->move_film(motion); }
   void warn_of_kinks(const Scene& scene, std::vector<std::string>& warnings) const override {
-    if (!edges_.parting()) return;
-    const auto [first, second] = *edges_.parting();
+    if (!edges_->parting()) return;
+    const auto [first, second] = *edges_->parting();
     const std::string whose = first == second
                                   ? fmt::format("edges of {}", quoted_name(scene, first))
                                   : fmt::format("edges of {} and {}", quoted_name(scene, first),
@@ -55,13 +64,14 @@ class CameraTerm final : public Term {
         whose));
   }
   void describe(GradientStats& stats) const override {
-    stats.setup.emplace_back("edges on the film", edges_.list_seconds());
-    stats.edges.emplace_back("moving on the film", edges_.size());
+    stats.setup.emplace_back("edges on the film", edges_->list_seconds());
+    stats.edges.emplace_back("moving on the film", edges_->size());
   }
 
  private:
   const EdgeSamplerInput& input_;
-  CameraEdges edges_;
+  bool has_lens_;
+  std::unique_ptr<FilmEdges> edges_;
 };
 
 }  // namespace

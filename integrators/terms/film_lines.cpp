@@ -28,7 +28,8 @@ double fraction_along(const FilmLine& line, double x, double y) {
   const double dx = line.x1 - line.x0, dy = line.y1 - line.y0;
   return ((x - line.x0) * dx + (y - line.y0) * dy) / (line.length * line.length);
 }
-double depth_at(const FilmLine& line, double s) {
+double depth_at(const FilmLine& line, double s, bool parallel_rays) {
+  if (parallel_rays) return (1 - s) * line.depth0 + s * line.depth1;
   return 1 / ((1 - s) / line.depth0 + s / line.depth1);
 }
 
@@ -38,7 +39,8 @@ struct Common {
 };
 
 // Whether the ends of b lie on the line of a, and some of b lies before or behind a.
-std::optional<Common> in_common(const FilmLine& a, const FilmLine& b, double tolerance) {
+std::optional<Common> in_common(const FilmLine& a, const FilmLine& b, double tolerance,
+                                bool parallel_rays) {
   const auto is_off = [&](double x, double y) {
     return std::fabs(a.nx * (x - a.x0) + a.ny * (y - a.y0)) > tolerance;
   };
@@ -49,7 +51,8 @@ std::optional<Common> in_common(const FilmLine& a, const FilmLine& b, double tol
   const auto on_b = [&](double s) { return std::clamp((s - s0) / (s1 - s0), 0.0, 1.0); };
   const Common common{{from, to}, {on_b(from), on_b(to)}};
   const double middle = 0.5 * (from + to);
-  const double depth = depth_at(a, middle), other = depth_at(b, on_b(middle));
+  const double depth = depth_at(a, middle, parallel_rays);
+  const double other = depth_at(b, on_b(middle), parallel_rays);
   if (std::fabs(depth - other) <= kLeastDepth * (depth + other)) return {};
   return common;
 }
@@ -57,8 +60,11 @@ std::optional<Common> in_common(const FilmLine& a, const FilmLine& b, double tol
 class Finder {
  public:
   Finder(std::span<const FilmEdge> moving, std::span<const FilmLine> resting, const Camera& camera)
-      : moving_(moving), resting_(resting) {
-    const double width = 2 * camera.x_factor * std::tan(value(camera.fov) * (kPi / 360));
+      : moving_(moving), resting_(resting), parallel_rays_(camera.is_orthographic()) {
+    // Of parallel rays those that are a 2^-18 of the film's width apart are one.
+    const double width = camera.is_orthographic()
+                             ? 1
+                             : 2 * camera.x_factor * std::tan(value(camera.fov) * (kPi / 360));
     tolerance_ = kEdgeOn * camera.width / width;
     least_told_ = kLeastTold * camera.width;
     result_.in_line.resize(moving.size() + resting.size());
@@ -153,7 +159,7 @@ class Finder {
   bool is_pair(uint32_t a, uint32_t b) {
     const bool a_longer = line(a).length >= line(b).length;
     const uint32_t longer = a_longer ? a : b, shorter = a_longer ? b : a;
-    const auto common = in_common(line(longer), line(shorter), tolerance_);
+    const auto common = in_common(line(longer), line(shorter), tolerance_, parallel_rays_);
     if (!common) return false;
     result_.in_line[a] = result_.in_line[b] = true;
     const double length = (common->a[1] - common->a[0]) * line(longer).length;
@@ -183,6 +189,7 @@ class Finder {
 
   std::span<const FilmEdge> moving_;
   std::span<const FilmLine> resting_;
+  bool parallel_rays_;
   double tolerance_, least_told_;  // [pixels]
   Lanes fastest_;
   double x0_, y0_, size_;  // of the grid: its corner, a cell [pixels]

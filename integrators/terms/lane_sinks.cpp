@@ -153,15 +153,16 @@ void VertexLanes::add(const Rgb<double>& amount) {
   }
 }
 
-bool FilmLanes::at(double x, double y) {
-  sample_.x = x;
-  sample_.y = y;
+bool FilmLanes::at(const FilmPlace& place) {
+  place_ = place;
+  sample_.x = place.x;
+  sample_.y = place.y;
   return true;
 }
 
 bool FilmLanes::takes(const BoundaryForm& form, const Rng&) {
   form_ = &form;
-  const auto ray = scene_.camera.ray<Dual>(sample_.x, sample_.y);
+  const auto ray = ray_at(CameraView<Dual>(scene_.camera), place_);
   rate_ = rate_of(scene_, form,
                   {value(ray.origin), velocity_of(ray.origin), {}, velocity_of(ray.direction)});
   return !is_zero(rate_) || moves_film_;

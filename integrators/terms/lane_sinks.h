@@ -82,7 +82,7 @@ class FilmLanes final : public FilmSink {
   }
   bool added() const { return added_; }
 
-  bool at(double x, double y) override;
+  bool at(const FilmPlace& place) override;
   bool takes(const BoundaryForm& form, const Rng& key) override;
   void add(const Rgb<double>& amount) override;
   void add_line(const FilmLineSample& line, const Rgb<double>& jump) override;
@@ -91,6 +91,7 @@ class FilmLanes final : public FilmSink {
   const Scene& scene_;
   bool moves_film_;
   FilmSample& sample_;
+  FilmPlace place_;
   TermCost own_;
   bool added_ = false;
   const BoundaryForm* form_ = nullptr;

@@ -164,8 +164,7 @@ PenumbraShare penumbra_share(const Scene& scene, const EdgeSamplerInput& edges,
   const double pdf = regions.direction_pdf(line.region, line.e, omega);
   if (!(pdf > 0)) return {};
 
-  const Vec3d q = bounces == 0 ? value(scene.camera.origin) : step.from;
-  const Vec3d sight = line.p - q;
+  const Vec3d sight = line.p - step.from;
   const double distance = length(sight);
   const double seen = std::fabs(dot(line.n, sight)) / (distance * distance * distance);
   PenumbraShare result;
@@ -177,7 +176,7 @@ PenumbraShare penumbra_share(const Scene& scene, const EdgeSamplerInput& edges,
   double lines = probability * result.density, points = step.pdf;
   if (bounces == 0) {
     const double pixels = static_cast<double>(scene.film.crop_width) * scene.film.crop_height;
-    lines *= pixels / film_per_solid_angle(scene.camera, sight / distance);
+    lines *= pixels / film_per_solid_angle(scene.camera, sight / distance, distance);
     points = 1;
   }
   const auto& ends = edges.object(line.edge.object).edge(line.edge.edge).vertices;

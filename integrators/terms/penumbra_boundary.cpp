@@ -71,14 +71,18 @@ void PenumbraTerm::sample_film(double u, const Rng& key, FilmSink& sink) const {
   auto drawn = lines_.draw(u, rng, rays);
   sink.cost().add(rays);
   if (!drawn) return;
-  const auto seen = film_point(context_.scene, drawn->face, drawn->line.p);
-  if (!seen || !sink.at(seen->x, seen->y) || !lines_.complete(*drawn, {}, 0, rng)) return;
+  const LensPoint lens = sample_lens(context_.scene.camera, key);
+  const auto seen = film_point(context_.scene, drawn->face, drawn->line.p, lens);
+  if (!seen || !sink.at(seen->at)) return;
+  const Vec3d from = value(seen->ray.origin);
+  if (!lines_.complete(*drawn, {from, 0}, 0, rng)) return;
   RayCount shadow;
   const bool hidden = is_hidden(context_, *seen, drawn->face, shadow);
   sink.cost().add(shadow);
   if (hidden) return;
-  drawn->edge.probability /= film_per_solid_angle(context_.scene.camera, seen->omega);
-  add(*drawn, value(seen->ray.origin), {seen->omega, seen->distance}, grey(1.0), 0, key, sink);
+  drawn->edge.probability /=
+      film_per_solid_angle(context_.scene.camera, seen->omega, seen->distance);
+  add(*drawn, from, {seen->omega, seen->distance}, grey(1.0), 0, key, sink);
 }
 
 void PenumbraTerm::add_sample(const PathVertex& viewer, const Rng& key, BoundarySink& sink) const {

@@ -160,7 +160,8 @@ void ShadowTerm::add_samples(const PathVertex& vertex, int samples, BoundarySink
   sink.cost().samples += static_cast<uint64_t>(samples);
   Viewer viewer{vertex, query_at(vertex), {}};
   if (pieces_ && vertex.bounces == 0) {
-    viewer.by_lines = lines_.vertex(vertex.surface.face, vertex.surface.p);
+    viewer.by_lines = lines_.vertex(vertex.surface.face, vertex.surface.p,
+                                    sample_lens(context_.scene.camera, vertex.key));
   }
   for (Rng& rng : by_edges) {
     const uint32_t edge = edges_.choose(rng.uniform());
@@ -242,11 +243,12 @@ void ShadowTerm::add_seen(double u, double share, const Rng& key, FilmSink& sink
   const auto point = edges_.cast(edge, key.at(Purpose::kShadow, 0).uniform(), key, rays);
   sink.cost().add(rays);
   if (!point) return;
-  const auto seen = film_point(context_.scene, point->face, point->x);
-  if (!seen || !sink.at(seen->x, seen->y)) return;
+  const auto seen =
+      film_point(context_.scene, point->face, point->x, sample_lens(context_.scene.camera, key));
+  if (!seen || !sink.at(seen->at)) return;
   const Vec3d q = value(seen->ray.origin);
   const Rgb<double> amount = edges_.jump(edge, *point, q, seen->omega);
-  const double scale = film_per_solid_angle(context_.scene.camera, seen->omega) /
+  const double scale = film_per_solid_angle(context_.scene.camera, seen->omega, seen->distance) /
                        (edges_.probability(chosen) * share);
   if (is_black(amount)) return;
   const BoundaryForm form = sweep(edge, *point, {seen->omega, seen->distance}, scale);
@@ -266,9 +268,11 @@ void ShadowTerm::add_line(double u, const Rng& key, FilmSink& sink) const {
   const double t = rng.uniform(), u_0 = rng.uniform(), u_1 = rng.uniform();
   RayCount rays;
   const auto point = edges_.cast(edge, t, key, rays);
-  const auto vertex = point ? lines_.draw(edge, *point, u_0, u_1, rays) : std::nullopt;
+  const auto vertex =
+      point ? lines_.draw(edge, *point, u_0, u_1, sample_lens(scene.camera, key), rays)
+            : std::nullopt;
   sink.cost().add(rays);
-  if (!vertex || !sink.at(vertex->seen.x, vertex->seen.y)) return;
+  if (!vertex || !sink.at(vertex->seen.at)) return;
   const Vec3d omega = vertex->seen.omega;
   const auto surface =
       surface_on_ray<double>(scene, vertex->face, value(vertex->seen.ray.origin), omega);

@@ -13,7 +13,7 @@
 
 namespace limn {
 
-// A point q of a face, and where the camera sees it.
+// A point q of a face, and where the camera sees it through a point of its lens.
 struct SeenVertex {
   FaceRef face;
   Vec3d q;
@@ -31,11 +31,11 @@ class ShadowLines {
       : context_(context), input_(input) {}
 
   // A vertex that lines may find, if it is one.
-  std::optional<SeenVertex> vertex(FaceRef face, const Vec3d& q) const;
+  std::optional<SeenVertex> vertex(FaceRef face, const Vec3d& q, const LensPoint& lens) const;
   // The vertex that a line from a point meets by uniform numbers, which may be hidden from the
   // camera.
   std::optional<SeenVertex> draw(const ShadowEdge& edge, const ShadowPoint& point, double u_0,
-                                 double u_1, RayCount& rays) const;
+                                 double u_1, const LensPoint& lens, RayCount& rays) const;
   // Density on the film of `draw` [1 / pixel^2].
   double density(const ShadowEdge& edge, const ShadowPoint& point, const SeenVertex& vertex) const;
   // What lines have of the point and the vertex. probability: of the edge.

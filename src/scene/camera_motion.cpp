@@ -58,21 +58,28 @@ class CameraRotation final : public Motion {
   int axis_;
 };
 
-class FieldOfView final : public Motion {
+// A number of the camera, larger than 0.
+class CameraNumber final : public Motion {
  public:
-  // The field of view lies strictly between 0 and 180 degrees.
   static constexpr double kLeast = std::numeric_limits<double>::min();
-  static double most() { return std::nextafter(180.0, 0.0); }
 
+  CameraNumber(Dual Camera::*number, double most) : number_(number), most_(most) {}
   Moved moved() const override { return {.camera = true}; }
-  void seed(Scene& scene, int lane, size_t) const override { scene.camera.fov.d[lane] += 1; }
-  void move(Scene& scene, double step, size_t) const override { scene.camera.fov.v += step; }
-  std::vector<double> numbers(const Scene& scene) const override { return {scene.camera.fov.v}; }
+  void seed(Scene& scene, int lane, size_t) const override { number(scene).d[lane] += 1; }
+  void move(Scene& scene, double step, size_t) const override { number(scene).v += step; }
+  std::vector<double> numbers(const Scene& scene) const override {
+    return {(scene.camera.*number_).v};
+  }
   void assign(Scene& scene, const std::string& name, const std::vector<double>& value,
               std::vector<std::string>*) const override {
-    check_numbers(scene, name, value, 1, kLeast, most());
-    scene.camera.fov.v = value[0];
+    check_numbers(scene, name, value, 1, kLeast, most_);
+    number(scene).v = value[0];
   }
+
+ private:
+  Dual& number(Scene& scene) const { return scene.camera.*number_; }
+  Dual Camera::*number_;
+  double most_;
 };
 
 }  // namespace
@@ -86,8 +93,16 @@ void add_camera_parameters(const Scene& scene, std::vector<Parameter>& list) {
     list.push_back(
         {"sensor.rotate." + end, "radians", 0.01, 1, std::make_shared<CameraRotation>(axis)});
   }
-  list.push_back({"sensor.fov", "degrees", 0.01 * scene.camera.fov.v, 1,
-                  std::make_shared<FieldOfView>(), FieldOfView::kLeast, FieldOfView::most()});
+  const auto add = [&](const char* name, const char* unit, Dual Camera::*number, double most) {
+    list.push_back({name, unit, 0.01 * (scene.camera.*number).v, 1,
+                    std::make_shared<CameraNumber>(number, most), CameraNumber::kLeast, most});
+  };
+  if (!scene.camera.is_orthographic()) {
+    add("sensor.fov", "degrees", &Camera::fov, std::nextafter(180.0, 0.0));
+  }
+  if (!scene.camera.has_lens()) return;
+  add("sensor.aperture_radius", "scene units", &Camera::aperture_radius, kLargestCoordinate);
+  add("sensor.focus_distance", "scene units", &Camera::focus_distance, kLargestCoordinate);
 }
 
 }  // namespace limn

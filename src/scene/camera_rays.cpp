@@ -1,10 +1,20 @@
-// Camera rays, eight at a time.
+// Camera rays, eight at a time, and points of lenses.
 #include <algorithm>
+#include <cmath>
 
 #include "limn/core/camera.h"
 #include "src/base/wide.h"
 
 namespace limn {
+
+LensPoint lens_point(double u, double v) {
+  const double x = 2 * u - 1, y = 2 * v - 1;
+  if (x == 0 && y == 0) return {};
+  const bool steep = std::fabs(x) < std::fabs(y);
+  const double r = steep ? y : x;
+  const double angle = steep ? kPi / 2 - kPi / 4 * (x / y) : kPi / 4 * (y / x);
+  return {r * std::cos(angle), r * std::sin(angle)};
+}
 
 void find_rays(const CameraView<double>& view, std::span<const Camera::FilmPoint<double>> positions,
                std::span<CameraRay<double>> rays) {

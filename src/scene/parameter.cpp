@@ -177,7 +177,6 @@ Image Parameter::texel_velocities(const Scene& scene, size_t component) const {
 
 std::vector<Parameter> list_parameters(const Scene& scene) {
   std::vector<Parameter> list;
-  if (scene.camera.is_orthographic()) return list;
   if (!has_texel_borders(scene)) add_moving_parameters(scene, list);
   add_bsdf_parameters(scene, list);
   add_emitter_parameters(scene, list);
@@ -186,9 +185,6 @@ std::vector<Parameter> list_parameters(const Scene& scene) {
 }
 
 Parameter find_parameter_or_array(const Scene& scene, const std::string& name) {
-  if (scene.camera.is_orthographic()) {
-    throw InputError({scene.file}, "orthographic: there are images, no derivatives");
-  }
   constexpr std::string_view kOneValue = ".value";
   if (name.ends_with(kOneValue)) {
     return find_parameter_or_array(scene, name.substr(0, name.size() - kOneValue.size()));

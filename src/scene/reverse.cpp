@@ -441,9 +441,12 @@ CameraView<Var> camera_leaves(const Camera& camera) {
   const auto vector = [&](const Vec3<Dual>& v, uint32_t offset) {
     return slot == 0 ? Vec3<Var>{v.x.v, v.y.v, v.z.v} : detail::leaves(value(v), slot + offset);
   };
-  const Var fov{camera.fov.v, slot == 0 ? 0 : Tape::current()->leaf(slot + 12)};
+  const auto number = [&](const Dual& v, uint32_t offset) {
+    return Var{v.v, slot == 0 ? 0 : Tape::current()->leaf(slot + offset)};
+  };
   return CameraView<Var>(camera, vector(camera.origin, 0), vector(camera.left, 3),
-                         vector(camera.up, 6), vector(camera.forward, 9), fov);
+                         vector(camera.up, 6), vector(camera.forward, 9), number(camera.fov, 12),
+                         {number(camera.aperture_radius, 13), number(camera.focus_distance, 14)});
 }
 
 std::array<Vec3<Var>, 3> corner_leaves(const Scene& scene, FaceRef face) {

@@ -236,6 +236,16 @@ void set_axes(Properties& p, const Matrix4& m, Camera& camera) {
   camera.origin = dual({m.m[0][3], m.m[1][3], m.m[2][3]});
 }
 
+// Mitsuba's: in focus is a distance along the view, by default the far clip plane's. A lens of
+// radius 0 is a pinhole.
+void read_lens(Properties& p, Camera& camera) {
+  if (!p.has("aperture_radius")) p.fail("needs aperture_radius (0: a pinhole)");
+  const double radius = p.number("aperture_radius", 0);
+  if (!(radius >= 0)) p.fail("aperture_radius", "must not be negative");
+  camera.aperture_radius = radius;
+  camera.focus_distance = positive(p, "focus_distance", camera.far_clip);
+}
+
 }  // namespace
 
 Sensor read_sensor(const ObjectDescription& sensor, const SceneDescription& description,
@@ -243,8 +253,9 @@ Sensor read_sensor(const ObjectDescription& sensor, const SceneDescription& desc
   Sensor read;
   read.id = sensor.id;
   const bool orthographic = sensor.type == "orthographic";
-  if (!orthographic && sensor.type != "perspective") {
-    fail_unknown_type(sensor, {"orthographic", "perspective"});
+  const bool lens = sensor.type == "thinlens";
+  if (!orthographic && !lens && sensor.type != "perspective") {
+    fail_unknown_type(sensor, {"orthographic", "perspective", "thinlens"});
   }
   DescribedProperties p(sensor, description, kNoMakers);
   Camera& camera = read.camera;
@@ -269,11 +280,12 @@ Sensor read_sensor(const ObjectDescription& sensor, const SceneDescription& desc
   if (!(camera.near_clip < camera.far_clip)) p.fail("far_clip", "must be larger than near_clip");
   camera.far_clip += (size.z - 1) * camera.near_clip;
   camera.near_clip *= size.z;
-  if (!orthographic) {
+  if (!orthographic && !lens) {
     camera.offset_x = p.number("principal_point_offset_x", 0);
     camera.offset_y = p.number("principal_point_offset_y", 0);
   }
-  // Accepted and ignored: nothing moves during an exposure, and a pinhole has no focus. They have
+  if (lens) read_lens(p, camera);
+  // Accepted and ignored: nothing moves during an exposure, and only a lens has a focus. They have
   // no effect in Mitsuba either.
   p.number("shutter_open", 0);
   p.number("shutter_close", 0);

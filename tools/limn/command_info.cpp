@@ -57,9 +57,13 @@ void print_shape(const json& shape) {
 void print_camera(const Scene& scene) {
   const Camera& camera = scene.camera;
   const Film& film = scene.film;
-  const std::string lens = camera.is_orthographic()
-                               ? fmt::format("orthographic, {:.6g} wide", 2 * camera.half_width)
-                               : fmt::format("fov {:.6g} degrees", camera.fov.v);
+  std::string lens = camera.is_orthographic()
+                         ? fmt::format("orthographic, {:.6g} wide", 2 * camera.half_width)
+                         : fmt::format("fov {:.6g} degrees", camera.fov.v);
+  if (camera.has_lens()) {
+    lens += fmt::format(", lens of radius {:.6g} focused at {:.6g}", camera.aperture_radius.v,
+                        camera.focus_distance.v);
+  }
   fmt::print("camera: at ({:.6g}, {:.6g}, {:.6g}), {}, film {} x {}", camera.origin.x.v,
              camera.origin.y.v, camera.origin.z.v, lens, camera.width, camera.height);
   if (film.crop_width != camera.width || film.crop_height != camera.height) {

@@ -7,7 +7,7 @@ import numpy as np
 
 SCENE = """<scene version="3.0.0">
   <integrator type="path">{integrator}</integrator>
-  <sensor type="perspective">
+  <sensor type="{camera}">
     {sensor}
     <transform name="to_world"><lookat origin="1.5,3,6" target="0.1,0.7,0" up="0,1,0"/></transform>
     <film type="hdrfilm"><string name="component_format" value="float32"/>
@@ -127,8 +127,9 @@ def write_sky(file, width, height):
 
 
 def scene(folder, name, **parts):
-    defaults = {"integrator": DEPTH.format(3, 1000), "sensor": FOV, "film": SIZE.format(48, 48) + BOX,
-                "floor": GREY, "objects": CUBE, "lights": ONE_LAMP + CONSTANT}
+    defaults = {"integrator": DEPTH.format(3, 1000), "camera": "perspective", "sensor": FOV,
+                "film": SIZE.format(48, 48) + BOX, "floor": GREY, "objects": CUBE,
+                "lights": ONE_LAMP + CONSTANT}
     file = os.path.join(folder, name.replace(" ", "_") + ".xml")
     with open(file, "w") as out:
         out.write(SCENE.format(**{**defaults, **parts}))
@@ -176,6 +177,12 @@ def sensors_and_films():
     yield "focal length", {"sensor": '<string name="focal_length" value="40mm"/>'}, []
     yield "clip planes", {"sensor": FOV + '<float name="near_clip" value="5.5"/>'
                           '<float name="far_clip" value="7.5"/>'}, []
+    for radius, focus in ((0.2, 5), (0.5, 9), (1.5, 3)):
+        lens = (f'<float name="aperture_radius" value="{radius}"/>'
+                f'<float name="focus_distance" value="{focus}"/><float name="near_clip" value="5"/>')
+        yield f"thinlens {radius}", {"camera": "thinlens", "sensor": FOV + lens}, []
+    yield "thinlens focus", {"camera": "thinlens", "sensor": FOV +
+                             '<float name="aperture_radius" value="0.1"/>'}, []
 
 
 def materials(envmap):

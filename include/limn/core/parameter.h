@@ -14,6 +14,8 @@
 //   sensor.translate.x|y|z        scene units
 //   sensor.rotate.x|y|z           radians, world axes through the pinhole
 //   sensor.fov                    degrees
+//   sensor.aperture_radius        scene units, of a sensor with a lens
+//   sensor.focus_distance         scene units, the same
 //   EMITTER.data                  an array, the H by W by 3 texels of an envmap, without its scale
 //   EMITTER.data.ROW.COLUMN.r|g|b one of them, counted from 0, row 0 on top
 //   EMITTER.data:FILE             moves every texel by the parameter times that of an EXR

@@ -40,7 +40,8 @@ enum class Purpose : uint64_t {
   kDirectCopy,
   kTermRoulette,
   kVertexSplit,
-  kDrawRoulette
+  kDrawRoulette,
+  kLens
 };
 
 // SplitMix64, seeded by a hash of (seed, pixel, sample): the stream of one path. `at` derives the

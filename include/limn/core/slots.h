@@ -34,8 +34,8 @@ struct SeededCopy {
 template <class T>
 using SeededCopies = std::vector<SeededCopy<T>>;
 
-// The camera's values: origin, left, up, forward (three each), fov.
-inline constexpr uint32_t kCameraSlots = 13;
+// The camera's values: origin, left, up, forward (three each), fov, aperture_radius, focus_distance.
+inline constexpr uint32_t kCameraSlots = 15;
 
 struct SceneSlots {
   const Scene* scene = nullptr;        // must outlive this object

@@ -127,7 +127,7 @@ struct FitState {
     std::vector<FaceIndices> faces;  // F by 3
   };
   struct View {
-    std::vector<double> camera;               // origin, left, up, forward, fov
+    std::vector<double> camera;               // origin, left, up, forward, fov, lens
     std::vector<Shape> shapes;                // of those that are moved, in the scene's order
     std::vector<std::vector<double>> values;  // of each parameter but vertices; empty: it has none
     // H by W by 3 each, of the maps that motions without values move.

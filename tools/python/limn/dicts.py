@@ -19,7 +19,7 @@ from .errors import InputError
 TYPES = {
     "integrator": ["aov", "direct", "direct_projective", "moment", "path", "prb", "prb_basic",
                    "prb_projective", "ptracer", "volpath", "volpathmis"],
-    "sensor": ["perspective", "orthographic"],
+    "sensor": ["perspective", "orthographic", "thinlens"],
     "film": ["hdrfilm"],
     "rfilter": ["box", "gaussian", "tent"],
     "sampler": ["independent", "ldsampler", "multijitter", "orthogonal", "stratified"],

@@ -1,0 +1,42 @@
+#pragma once
+// Edges on the film of a camera with a lens. From every point of the lens others are silhouettes,
+// elsewhere on the film. All that may be seen from some point of it are listed once; a sample
+// chooses an edge and a point of the lens, tests exactly whether that sees the edge, and draws from
+// what of it is then on the film.
+#include "integrators/terms/film_edges.h"
+#include "limn/core/discrete_distribution.h"
+
+namespace limn {
+
+class LensEdges final : public FilmEdges {
+ public:
+  // lanes: those of the scene's tangents, without `free`.
+  LensEdges(const PathContext& context, const EdgeSamplerInput& input, int lanes,
+            const FreeMotion* free);
+
+  bool empty() const override { return listed_.empty(); }
+  size_t size() const override { return listed_.size(); }
+  const Parting& parting() const override { return parting_; }
+  std::optional<FilmEdgePoint> choose(double u, const LensPoint& lens) const override;
+
+ private:
+  struct Listed {
+    EdgeRef id;
+    uint32_t clip = FilmEdge::kNoClip;
+    Lanes weight;  // mean length times speed
+  };
+  void list();
+  void add_object(ShapeId object);
+  bool may_be_candidate(const EdgeMesh& mesh, EdgeId edge) const;
+  bool moves(const EdgeMesh& mesh, EdgeId edge) const;
+  bool place(const Listed& listed, const CameraView<Dual>& view, FilmEdge& edge) const;
+  void weigh();
+
+  int lanes_;
+  CameraView<Dual> view_;
+  std::vector<Listed> listed_;
+  DiscreteDistribution choice_;
+  Parting parting_;  // none: that two edges lie in one line is true for no area of the lens
+};
+
+}  // namespace limn
