@@ -8,16 +8,33 @@
 
 namespace limn {
 
+namespace {
+
+// The corners of a face, as they may move.
+auto moving_corners(const Scene& scene) {
+  return [&scene](FaceRef face) { return corner_leaves(scene, face); };
+}
+
+}  // namespace
+
 bool VertexAdjoint::takes(const BoundaryForm& form, const Rng&) {
   form_ = &form;
-  return form.share > 0 && (motion_.moves(form) || !is_constant(p_));
+  return form.share > 0 && (motion_.moves(form) || !is_constant(p_) || form.by.count > 0);
 }
 
 void VertexAdjoint::add(const Rgb<double>& amount) {
   const double weight = weighed(adjoint_, amount) * form_->scale * form_->share;
   if (weight == 0) return;
   motion_.contribute(tape_, seeds_, *form_, weight);
-  seeds_.add(p_, form_->of_ray() * weight);
+  const Vec3d g = form_->of_ray() * weight;
+  if (form_->by.count == 0) {
+    seeds_.add(p_, g);
+  } else {
+    Vec3<Var> origin = p_, direction{form_->leaves.x, form_->leaves.y, form_->leaves.z};
+    reflect_ray(form_->by, moving_corners(motion_.scene()), origin, direction);
+    seeds_.add(origin, g);
+    seeds_.add(direction, g * form_->distance);
+  }
   if (log()) log()->push_back(fmt::format("    adds with weight {:.6g}", weight));
 }
 
@@ -36,8 +53,9 @@ void FilmPointAdjoint::add(const Rgb<double>& amount) {
   added_ = true;
   const double weight = weighed(adjoint_, amount) * form_->scale * share_;
   motion_.contribute(tape_, seeds_, *form_, weight);
-  if (motion_.slots().camera == 0) return;
-  const auto ray = ray_at(camera_leaves(motion_.scene().camera), place_);
+  if (motion_.slots().camera == 0 && form_->by.count == 0) return;
+  auto ray = ray_at(camera_leaves(motion_.scene().camera), place_);
+  reflect_ray(form_->by, moving_corners(motion_.scene()), ray.origin, ray.direction);
   const Vec3d g = form_->of_ray() * weight;
   seeds_.add(ray.origin, g);
   seeds_.add(ray.direction, g * form_->distance);
@@ -51,13 +69,20 @@ void FilmPointAdjoint::add_line(const FilmLineSample& line, const Rgb<double>& j
     add_clip(line, weighed(adjoint_, jump) * share_ / line.density);
     return;
   }
-  const CameraView<Dual> view = CameraView<Dual>(motion_.scene().camera).at(place_.lens);
+  Camera camera = motion_.scene().camera;
+  for (const FaceRef face : line.by.all()) {
+    const Mesh& mesh = motion_.scene().shape(face.shape).mesh;
+    const auto corners = face_corners<double>(mesh, face.face);
+    camera = image_of(camera, at_rest(MirrorPlane<double>::through(corners)));
+  }
+  const CameraView<Dual> view = CameraView<Dual>(camera).at(place_.lens);
   const auto [a, b] = line.mesh->edge(line.edge.edge).vertices;
   BoundaryForm form;
   form.x = line.mesh->position(a) * (1 - line.t) + line.mesh->position(b) * line.t;
   const Vec3<Dual> x{{form.x.x, {1, 0, 0, 0}}, {form.x.y, {0, 1, 0, 0}}, {form.x.z, {0, 0, 1, 0}}};
   form.distance = length(form.x - value(view.start_of(x)));
   form.scale = 1 / line.density;
+  form.by = line.by;
   const auto at = view.project(x);
   Vec3d g;
   for (int k = 0; k < 3; ++k) g[k] = line.nx * at.x.d[k] + line.ny * at.y.d[k];

@@ -142,6 +142,7 @@ class PathTracer {
   // path_smooth.h
   bool turns_smoothly(Walk& walk) const;
   bool turn_smoothly(Walk& walk) const;
+  bool hides_edges(Walk& walk, const Vec3d& wo) const;
   size_t turn_smoothly(Walk** walks, size_t& count, Walk** turned) const;
   void leave_surface(Walk& walk, double eta) const;
   // path_wide.h. For plain numbers.

@@ -1,5 +1,6 @@
 #pragma once
 // What paths are followed in, alike for all of them, and small things that all of them use.
+#include "integrators/edges/flat_mirrors.h"
 #include "integrators/edges/viewpoint.h"
 #include "integrators/lights/closed_light.h"
 #include "integrators/lights/mirrored_light.h"
@@ -23,6 +24,8 @@ struct PathContext {
   // throughput. Else what a material changes cancels in all paths that survive in both images, and
   // the whole derivative is in the few that survive in one, by much over the step.
   const Scene* unmoved = nullptr;
+  // By way of which edges are seen; null where there are none, or no path starts beside an edge.
+  const FlatMirrors* flat_mirrors = nullptr;
 };
 
 // Does nothing at path vertices.

@@ -26,13 +26,26 @@ inline bool PathTracer<S, Visitor>::turns_smoothly(Walk& walk) const {
   return true;
 }
 
+// Whether the edges that the smooth ray wo sees are in no term: the path has come otherwise than by
+// a chain of flat mirrors.
+template <class S, class Visitor>
+inline bool PathTracer<S, Visitor>::hides_edges(Walk& walk, const Vec3d& wo) const {
+  if (walk.step.pdf > 0) walk.mirrors = 0;
+  const Vec3d n = walk.scattering->front() ? walk.surface.n_g : -walk.surface.n_g;
+  if (!c_.flat_mirrors || ++walk.mirrors > FlatMirrors::kLongest) return true;
+  // From the camera, where that is not a pinhole.
+  const bool from_camera = walk.bounces + 1 == static_cast<int>(walk.mirrors);
+  return (from_camera && !c_.scene.camera.is_pinhole()) || !is_mirrored(n, value(walk.wi), wo) ||
+         c_.flat_mirrors->of(walk.surface.face) == FlatMirrors::kNone;
+}
+
 // Along the smooth ray that was chosen; false where the path ends. Its direction moves with the
 // vertex, and what holds directions of rough lobes does not hold this one.
 template <class S, class Visitor>
 inline bool PathTracer<S, Visitor>::turn_smoothly(Walk& walk) const {
   const SmoothRay<S> ray = walk.scattering->smooth_ray(walk.smooth_ray);
   if (!(walk.smooth_share > 0) || detail::stays_black(ray.weight)) return false;
-  if (!walk.turned_by.valid()) {
+  if (!walk.turned_by.valid() && hides_edges(walk, value(ray.wo))) {
     walk.turned_by = walk.surface.face.shape;
     walk.before_turn = value(walk.sums.radiance);
   }

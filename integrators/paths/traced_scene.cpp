@@ -16,7 +16,10 @@ TracedScene::TracedScene(const Scene& scene, int threads, const Options& options
       closed_(options.closed ? std::make_unique<ClosedLight>(scene, threads) : nullptr),
       viewpoints_(options.edges ? std::make_unique<Viewpoints>(scene) : nullptr),
       mirrored_(options.closed ? nullptr : MirroredLight::make(scene, lights_)),
-      context_{scene, *tracer_, lights_, closed_.get(), viewpoints_.get(), mirrored_.get()} {}
+      flat_mirrors_(options.edges && find_smooth(scene) ? FlatMirrors::make(scene) : nullptr),
+      context_{scene,         *tracer_,           lights_,
+               closed_.get(), viewpoints_.get(),  mirrored_.get(),
+               nullptr,       flat_mirrors_.get()} {}
 
 TracedScene::TracedScene(const Scene& moved, const PathChoices& choices, int threads)
     : tracer_(make_embree_tracer(moved, threads)),

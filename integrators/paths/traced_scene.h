@@ -46,6 +46,7 @@ class TracedScene {
   std::unique_ptr<ClosedLight> closed_;      // null where paths are sampled
   std::unique_ptr<Viewpoints> viewpoints_;   // null where none starts beside an edge
   std::unique_ptr<MirroredLight> mirrored_;  // null where nothing mirrors
+  std::unique_ptr<const FlatMirrors> flat_mirrors_;
   PathContext context_;
 };
 

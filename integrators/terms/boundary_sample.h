@@ -12,6 +12,7 @@
 #include <optional>
 #include <vector>
 
+#include "integrators/edges/flat_mirrors.h"
 #include "integrators/estimates/sample_estimator.h"
 #include "integrators/paths/camera_path.h"
 #include "limn/core/light.h"
@@ -46,6 +47,10 @@ struct BoundaryForm {
   std::array<MovingPoint, 5> points;
   int count = 0;
   std::optional<MovingLift> lift;
+  // The viewer sees x by way of these: `distance` is that of x from its image in them. leaves: in
+  // this unit direction, from a vertex.
+  MirrorFaces by;
+  Vec3d leaves = {};
 
   void add_edge(const EdgeMesh& mesh, EdgeRef edge, double t, const Vec3d& g) {
     points[count++] = {MovingPoint::Of::kEdge, &mesh, edge, t, {}, nullptr, g};
@@ -103,6 +108,7 @@ struct FilmLineSample {
   const EdgeMesh* mesh = nullptr;
   EdgeRef edge = {};
   double t = 0;  // on the edge, or the segment
+  MirrorFaces by = {};
 };
 
 // A sink of samples of the film: v_ray is that of the camera's ray through a fixed film position.

@@ -34,13 +34,15 @@ class CameraTerm final : public Term {
     const FilmEdgePoint& point = *drawn;
     RayCount rays;
     Rgb<double> jump;
-    const bool visible = edges_->jump_at(point, key, rays, jump);
+    MirrorFaces by;
+    const bool visible = edges_->jump_at(point, key, rays, jump, by);
     sink.cost().add(rays);
     if (!visible) return;
     const FilmEdge& edge = point.edge;
     const Lanes speed = edge.speed0 * (1 - point.s) + edge.speed1 * point.s;
     FilmLineSample line{edge.nx, edge.ny, speed, point.density};
     line.t = edges_->t_of(point);
+    line.by = by;
     if (edge.clip == FilmEdge::kNoClip) {
       line.mesh = &input_.object(edge.id.object);
       line.edge = edge.id;

@@ -2,6 +2,8 @@
 #include "integrators/terms/camera_edges.h"
 
 #include "integrators/estimates/splat.h"
+#include "integrators/terms/edge_difference.h"
+#include "integrators/terms/mirror_sight.h"
 
 namespace limn {
 namespace {
@@ -88,8 +90,7 @@ CameraEdges::CameraEdges(const PathContext& context, const EdgeSamplerInput& inp
     : FilmEdges(context, input, free),
       lanes_(free ? 3 : lanes),
       visible_(visible),
-      viewpoint_(context.viewpoints->camera),
-      view_(context.scene.camera) {
+      views_(list_film_views(context, free != nullptr)) {
   const Stopwatch watch;
   list();
   weigh({});
@@ -100,17 +101,33 @@ CameraEdges::CameraEdges(const PathContext& context, const EdgeSamplerInput& inp
 
 void CameraEdges::list() {
   edges_.clear();
-  for (uint32_t o = 0; o < input_.objects.size(); ++o) add_object(ShapeId(o));
-  for (uint32_t c = 0; c < clips_.size(); ++c) add_clip(c);
-  find_in_line();
-  if (visible_) keep_seen(*visible_);
+  for (uint32_t v = 0; v < views_.size(); ++v) {
+    const size_t first = edges_.size();
+    const CameraView<Dual> view(views_[v].camera);
+    for (uint32_t o = 0; o < input_.objects.size(); ++o) add_object(ShapeId(o), v, view);
+    if (v == 0) {
+      for (uint32_t c = 0; c < clips_.size(); ++c) add_clip(c);
+    }
+    find_in_line(first);
+    if (v == 0 && visible_) keep_seen(*visible_);
+  }
 }
 
-void CameraEdges::find_in_line() {
-  const EdgesInLine found = find_edges_in_line(edges_, resting_, context_.scene.camera);
-  for (size_t e = 0; e < edges_.size(); ++e) edges_[e].in_line = found.in_line[e];
-  parting_ = found.parting;
+void CameraEdges::find_in_line(size_t first) {
+  const auto edges = std::span(edges_).subspan(first);
+  const EdgesInLine found = find_edges_in_line(edges, resting_, context_.scene.camera);
+  for (size_t e = 0; e < edges.size(); ++e) edges[e].in_line = found.in_line[e];
+  if (!parting_ || first == 0) parting_ = found.parting;
   resting_ = {};
+}
+
+bool CameraEdges::may_move(const FilmEdge& edge, std::span<const FaceRef> faces) const {
+  if (free_->moves(faces)) return true;
+  const FilmView& view = views_[edge.view];
+  return std::ranges::any_of(
+      std::span(view.chain.mirrors).first(view.chain.count), [&](uint32_t m) {
+        return free_->moves(std::span(view.mirrors->mirrors()[m].faces).first(1));
+      });
 }
 
 // Lines keep their speeds where they are cut, which change linearly along them. Of edges in one
@@ -138,29 +155,33 @@ void CameraEdges::keep_seen(const FilmRegions& visible) {
       part.speed0 = at(edge.speed0, edge.speed1, s0);
       part.speed1 = at(edge.speed0, edge.speed1, s1);
       part.length = edge.length * (s1 - s0);
-      if (around.near.empty() && !viewpoint_.sees_edge_on(around)) part.beside = beside;
+      if (around.near.empty() && !views_[0].viewpoint->sees_edge_on(around)) part.beside = beside;
       seen.push_back(part);
     }
   }
   edges_ = std::move(seen);
 }
 
-void CameraEdges::add_object(ShapeId object) {
+void CameraEdges::add_object(ShapeId object, uint32_t index, const CameraView<Dual>& camera) {
+  const FilmView& view = views_[index];
   const EdgeMesh& mesh = input_.object(object);
   for (uint32_t e = 0; e < mesh.edges.size(); ++e) {
     const EdgeRef id{object, EdgeId(e)};
     FilmEdge edge;
-    if (!viewpoint_.is_candidate(mesh, id.edge) || is_hidden(mesh, id.edge)) continue;
-    if (!place(id, view_, edge)) continue;
+    edge.view = index;
+    if (!view.viewpoint->is_candidate(mesh, id.edge)) continue;
+    if (view.direct() ? is_hidden(mesh, id.edge) : view.touches_mirror(mesh.faces_around(id.edge)))
+      continue;
+    if (!place(id, camera, edge, view.direct() ? nullptr : &view)) continue;
     const FacesAround around = mesh.around(id.edge);
-    if (!viewpoint_.sees_edge_on(around)) edge.shape = around.faces[0].shape;
+    if (!view.viewpoint->sees_edge_on(around)) edge.shape = around.faces[0].shape;
     add(edge, faces_that_move(mesh, id.edge));
   }
 }
 
 void CameraEdges::add_clip(uint32_t index) {
   FilmEdge edge;
-  if (place(index, view_, edge)) add(edge, {&clips_[index].face, 1});
+  if (place(index, CameraView<Dual>(views_[0].camera), edge)) add(edge, {&clips_[index].face, 1});
 }
 
 void CameraEdges::move_film(const FilmMotionAt& motion) {
@@ -219,6 +240,37 @@ std::optional<FilmEdgePoint> CameraEdges::choose(double u, const LensPoint&) con
   point.at.y = edge.y0 + (edge.y1 - edge.y0) * point.s;
   point.density = draw.probability / (edge.length * (piece.s1 - piece.s0));
   return point;
+}
+
+// By way of mirrors the edge is where the camera's image sees it; rays tell what hides it.
+bool CameraEdges::jump_at(const FilmEdgePoint& point, const Rng& key, RayCount& rays,
+                          Rgb<double>& jump, MirrorFaces& by) const {
+  const FilmEdge& edge = point.edge;
+  if (edge.view == 0) return FilmEdges::jump_at(point, key, rays, jump, by);
+  const FilmView& view = views_[edge.view];
+  const EdgeMesh& mesh = input_.object(edge.id.object);
+  const auto& ends = mesh.edge(edge.id.edge).vertices;
+  const double t = t_of(point);
+  const Vec3d y = mesh.position(ends[0]) * (1 - t) + mesh.position(ends[1]) * t;
+  const LightOrigin image = edge.in_line ? view.viewpoint->aside(y)
+                                         : view.viewpoint->seeing(mesh.around(edge.id.edge), y);
+  const Camera& camera = scene().camera;
+  Ray ray = unfolded(*view.mirrors, view.chain, value(image.v), y);
+  const double cosine = dot(ray.direction, value(camera.forward));
+  ray.t_min = camera.near_clip / cosine;
+  ray.t_max = camera.far_clip / cosine;
+  ray.skip_emitters = scene().hide_emitters;
+  MirrorSight sight;
+  if (!follow_mirrors(context_, view.chain, ray, 0, rays, sight)) return false;
+  EdgeView beyond;
+  if (!view_edge(mesh, edge.id, t, sight.from, beyond)) return false;
+  if (!edge_difference(context_, mesh, beyond, sight.last(), 0,
+                       std::numeric_limits<double>::infinity(), sight.bounces, key, rays, jump)) {
+    return false;
+  }
+  jump = jump * sight.share;
+  by = sight.by;
+  return true;
 }
 
 }  // namespace limn

@@ -6,29 +6,6 @@
 namespace limn {
 namespace {
 
-struct Window {
-  double x0, y0, x1, y1;
-};
-
-// Where a film position can matter to a pixel of the crop window.
-Window sampled_window(const Film& film) {
-  const double border = film.sample_border ? film.filter.radius : 0;
-  return {film.crop_x - border, film.crop_y - border, film.crop_x + film.crop_width + border,
-          film.crop_y + film.crop_height + border};
-}
-
-// Cuts the parameter range [s0, s1] of a + s d to where it lies in [lower, upper] (Liang and
-// Barsky).
-bool clip(double a, double d, double lower, double upper, double& s0, double& s1) {
-  if (d == 0) return a >= lower && a <= upper;
-  double enter = (lower - a) / d;
-  double leave = (upper - a) / d;
-  if (enter > leave) std::swap(enter, leave);
-  s0 = std::max(s0, enter);
-  s1 = std::min(s1, leave);
-  return s0 < s1;
-}
-
 Camera::FilmPoint<double> film_of(const CameraView<Dual>& view, const Vec3d& x) {
   const auto at = view.project(Vec3<Dual>{x.x, x.y, x.z});
   return {at.x.v, at.y.v};
@@ -41,13 +18,6 @@ bool FilmEdges::is_hidden(const EdgeMesh& mesh, EdgeId edge) const {
   const auto faces = mesh.faces_around(edge);
   return std::all_of(faces.begin(), faces.end(),
                      [&](const FaceRef face) { return scene().shape(face.shape).is_emitter; });
-}
-
-bool FilmEdges::clip_to_window(double x0, double x1, double y0, double y1, double& s0,
-                               double& s1) const {
-  const Window window = sampled_window(scene().film);
-  return clip(x0, x1 - x0, window.x0, window.x1, s0, s1) &&
-         clip(y0, y1 - y0, window.y0, window.y1, s0, s1);
 }
 
 Vec3<Dual> FilmEdges::moving(const Vec3d& x, const Vec3<Lanes>& velocity) const {
@@ -64,7 +34,8 @@ bool FilmEdges::place(uint32_t index, const CameraView<Dual>& view, FilmEdge& ed
   edge.t0 = 0;
   edge.t1 = 1;
   // The plane is parallel to the film: fractions are the same on both.
-  if (!clip_to_window(film_a.x, film_b.x, film_a.y, film_b.y, edge.t0, edge.t1)) return false;
+  const FilmWindow window = sampled_window(scene().film);
+  if (!window.clip(film_a.x, film_b.x, film_a.y, film_b.y, edge.t0, edge.t1)) return false;
   const auto at = [&](double t) {
     const Vec3<Dual> x = a + (b - a) * t;
     return moving(value(x), {x.x.d, x.y.d, x.z.d});
@@ -75,9 +46,10 @@ bool FilmEdges::place(uint32_t index, const CameraView<Dual>& view, FilmEdge& ed
   return place_ends(at(edge.t0), at(edge.t1), side, view, edge);
 }
 
-bool FilmEdges::place(EdgeRef id, const CameraView<Dual>& view, FilmEdge& edge) const {
+bool FilmEdges::place(EdgeRef id, const CameraView<Dual>& view, FilmEdge& edge,
+                      const FilmView* image) const {
   const EdgeMesh& mesh = input_.object(id.object);
-  const Camera& camera = scene().camera;
+  const Camera& camera = view.camera();
   const auto& ends = mesh.edge(id.edge).vertices;
   const Vec3d a = mesh.position(ends[0]);
   const Vec3d b = mesh.position(ends[1]);
@@ -89,7 +61,8 @@ bool FilmEdges::place(EdgeRef id, const CameraView<Dual>& view, FilmEdge& edge) 
   const Vec3d pinhole = value(view.origin());
   const double rounding = 0x1p-48 * (length(a - pinhole) + length(b - pinhole));
   const double near = std::max(camera.near_clip, rounding);
-  if (!clip(depth_a, depth_b - depth_a, near, camera.far_clip, t0, t1)) return false;
+  if (!clip_range(depth_a, depth_b - depth_a, near, camera.far_clip, t0, t1)) return false;
+  if (image && !image->clip_to_mirror(a, b, t0, t1)) return false;
 
   const auto at = [&](double t) { return a + (b - a) * t; };
   const auto film0 = film_of(view, at(t0));
@@ -98,7 +71,8 @@ bool FilmEdges::place(EdgeRef id, const CameraView<Dual>& view, FilmEdge& edge) 
   const double z1 = camera.depth(at(t1));
   double s0 = 0;
   double s1 = 1;
-  if (!clip_to_window(film0.x, film1.x, film0.y, film1.y, s0, s1)) return false;
+  const FilmWindow window = image ? image->window : sampled_window(scene().film);
+  if (!window.clip(film0.x, film1.x, film0.y, film1.y, s0, s1)) return false;
 
   edge.id = id;
   edge.t0 = t0 + (t1 - t0) * fraction_in_space(s0, z0, z1);
@@ -116,7 +90,7 @@ bool FilmEdges::place(EdgeRef id, const CameraView<Dual>& view, FilmEdge& edge) 
 // to the positive side.
 bool FilmEdges::place_ends(const Vec3<Dual>& x0, const Vec3<Dual>& x1, const Vec3d& side,
                            const CameraView<Dual>& view, FilmEdge& edge) const {
-  const Camera& camera = scene().camera;
+  const Camera& camera = view.camera();
   const auto p0 = view.project(x0);
   const auto p1 = view.project(x1);
   const double dx = p1.x.v - p0.x.v;
@@ -162,7 +136,7 @@ Vec3d FilmEdges::viewer_of(const FilmEdgePoint& point, const FacesAround& around
 }
 
 bool FilmEdges::jump_at(const FilmEdgePoint& point, const Rng& key, RayCount& rays,
-                        Rgb<double>& jump) const {
+                        Rgb<double>& jump, MirrorFaces& /*by*/) const {
   const FilmEdge& edge = point.edge;
   const double t = t_of(point);
   const Camera& camera = scene().camera;

@@ -12,6 +12,7 @@
 #include "integrators/paths/camera_path.h"
 #include "integrators/paths/path.h"
 #include "integrators/terms/film_lines.h"
+#include "integrators/terms/film_views.h"
 #include "limn/edgetree/edge_sampler.h"
 
 namespace limn {
@@ -20,6 +21,7 @@ struct FilmEdge : FilmLine {
   EdgeRef id;
   static constexpr uint32_t kNoClip = UINT32_MAX;
   uint32_t clip = kNoClip;  // the clip segment that it is, in the place of an edge
+  uint32_t view = 0;        // by which flat mirrors it is seen, see CameraEdges; 0: by none
   double t0, t1;            // the part of the edge that may reach the film: its ends
   Lanes speed0, speed1;     // v_n there [pixels]; n points to the positive side of EdgeView::side
   std::optional<FaceRef> beside = {};  // FilmRegions::SeenPart; none: a ray tells
@@ -74,8 +76,9 @@ class FilmEdges {
   const ClipSegment& clip_of(const FilmEdge& edge) const { return clips_[edge.clip]; }
   // Where the point is on its edge, in space: (1 - t) of the edge's first end and t of the other.
   double t_of(const FilmEdgePoint& point) const;
-  // dL there; false if it is hidden.
-  bool jump_at(const FilmEdgePoint& point, const Rng& key, RayCount& rays, Rgb<double>& jump) const;
+  // dL there, and on which mirrors it is seen; false if it is hidden.
+  virtual bool jump_at(const FilmEdgePoint& point, const Rng& key, RayCount& rays,
+                       Rgb<double>& jump, MirrorFaces& by) const;
 
  protected:
   const Scene& scene() const { return context_.scene; }
@@ -83,7 +86,9 @@ class FilmEdges {
   bool is_hidden(const EdgeMesh& mesh, EdgeId edge) const;
   // Finds where an edge, or a clip segment, lies on the film of a view: what of it may be seen
   // there, if nothing hides it. False if none of it is.
-  bool place(EdgeRef id, const CameraView<Dual>& view, FilmEdge& edge) const;
+  // image: of the camera, if it is not that itself.
+  bool place(EdgeRef id, const CameraView<Dual>& view, FilmEdge& edge,
+             const FilmView* image = nullptr) const;
   bool place(uint32_t clip, const CameraView<Dual>& view, FilmEdge& edge) const;
   // The faces whose vertices an edge hangs on: of its own mesh, or, where two faces cross, both.
   static std::span<const FaceRef> faces_that_move(const EdgeMesh& mesh, EdgeId edge) {
@@ -103,7 +108,6 @@ class FilmEdges {
   double list_seconds_ = 0;
 
  private:
-  bool clip_to_window(double x0, double x1, double y0, double y1, double& s0, double& s1) const;
   Vec3<Dual> moving(const Vec3d& x, const Vec3<Lanes>& velocity) const;
   bool place_ends(const Vec3<Dual>& x0, const Vec3<Dual>& x1, const Vec3d& side,
                   const CameraView<Dual>& view, FilmEdge& edge) const;

@@ -90,6 +90,18 @@ Lanes rate_of(const Scene& scene, const BoundaryForm& form, const RayMotion& ray
   return sum * form.scale;
 }
 
+// Of a ray from a vertex that leaves in a direction at rest, beyond the mirrors.
+RayMotion image_of_ray(const Scene& scene, const BoundaryForm& form, const PathVertex& vertex) {
+  const Vec3d &p = vertex.surface.p, &w = form.leaves;
+  const Vec3<Lanes>& v = vertex.velocity;
+  Vec3<Dual> origin{{p.x, v.x}, {p.y, v.y}, {p.z, v.z}}, direction{w.x, w.y, w.z};
+  const auto corners = [&](FaceRef face) {
+    return face_corners<Dual>(scene.shape(face.shape).mesh, face.face);
+  };
+  reflect_ray(form.by, corners, origin, direction);
+  return {value(origin), velocity_of(origin), {}, velocity_of(direction)};
+}
+
 }  // namespace
 
 bool VertexLanes::takes(const BoundaryForm& form, const Rng& key) {
@@ -105,6 +117,7 @@ bool VertexLanes::takes(const BoundaryForm& form, const Rng& key) {
     ray.turn = {};
     if (motion) ray.direction = velocity_of(warped(omega, *motion->warp));
   }
+  if (form.by.count > 0) ray = image_of_ray(setting_.scene, form, vertex_);
   rate_ = rate_of(setting_.scene, form, ray);
   return !is_zero(rate_) || turned_;
 }

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "integrators/terms/glare_edges.h"
+#include "integrators/terms/mirror_edges.h"
 #include "integrators/terms/term_table.h"
 #include "integrators/terms/vertex_edges.h"
 
@@ -25,6 +26,7 @@ class BoundaryTerm final : public Term {
         part_{input.regions()},
         nothing_(input.warps && std::all_of(edges_.objects.begin(), edges_.objects.end(),
                                             [](const EdgeMesh& m) { return m.edges.empty(); })) {
+    if (context_.flat_mirrors) mirrors_.emplace(context_, edges_, sampler_);
     if (context_.mirrored) glare_.emplace(edges_, sampler_, *context_.mirrored);
     emitters_jump_ = std::ranges::any_of(edges_.objects, [&](const EdgeMesh& mesh) {
       return is_textured_emitter(mesh) && (mesh.of_texture() || mesh.count(EdgeClass::kSharp) > 0);
@@ -33,6 +35,7 @@ class BoundaryTerm final : public Term {
 
   bool uses_vertices() const override { return !nothing_; }
   void add_at_vertex(const PathVertex& vertex, int samples, BoundarySink& sink) const override {
+    if (mirrors_) mirrors_->add_at_vertex(vertex, samples, sink);
     if (is_left_out(vertex.bounces)) return;
     static thread_local GlareEdges::View view;
     const EdgeQuery query = query_at(vertex);
@@ -103,9 +106,10 @@ class BoundaryTerm final : public Term {
   const EdgeSampler& sampler_;
   double build_seconds_;
   RadiancePart part_;
-  std::optional<GlareEdges> glare_;  // none where nothing mirrors
-  bool nothing_;                     // warped directions follow all edges
-  bool emitters_jump_;               // some may, by their textures
+  std::optional<MirrorEdges> mirrors_;  // none where there are no flat ones
+  std::optional<GlareEdges> glare_;     // none where nothing mirrors
+  bool nothing_;                        // warped directions follow all edges
+  bool emitters_jump_;                  // some may, by their textures
 };
 
 void BoundaryTerm::add_before_glare(const PathVertex& vertex, const EdgeQuery& query, int samples,

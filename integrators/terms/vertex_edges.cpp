@@ -76,6 +76,36 @@ BoundaryForm form_of(const Scene& scene, const PathVertex& vertex, const EdgeDra
   return form;
 }
 
+// The ray from a vertex to a point of an edge, by way of mirrors.
+Ray leaving_by(const FlatMirrors& mirrors, const PathVertex& vertex, const MirrorWay& way,
+               const Vec3d& y, BoundaryForm& form) {
+  Ray ray = unfolded(mirrors, way.chain, way.image, y);
+  ray.origin = vertex.surface.p;
+  ray.start = vertex.surface.start();
+  form.leaves = ray.direction;
+  for (const uint32_t m : std::span(way.chain.mirrors).first(way.chain.count)) {
+    form.by.faces[form.by.count++] = mirrors.mirrors()[m].faces[0];
+  }
+  return ray;
+}
+
+// edge_difference() by way of mirrors, times what they reflect. form: gets the faces that do.
+bool mirrored_difference(const PathContext& context, const PathVertex& vertex, const EdgeDraw& draw,
+                         const Ray& ray, RayCount& rays, BoundaryForm& form, Rgb<double>& jump) {
+  MirrorSight sight;
+  if (!follow_mirrors(context, draw.way->chain, ray, vertex.bounces + 1, rays, sight)) return false;
+  EdgeView view;
+  if (!view_edge(draw.mesh, draw.sample.edge, draw.sample.t, sight.from, view)) return false;
+  if (!edge_difference(context, draw.mesh, view, sight.last(), 0,
+                       std::numeric_limits<double>::infinity(), sight.bounces, draw.key, rays, jump,
+                       draw.part)) {
+    return false;
+  }
+  jump = jump * sight.share;
+  form.by = sight.by;
+  return true;
+}
+
 }  // namespace
 
 void add_edge_point(const PathContext& context, const PathVertex& vertex, const EdgeDraw& draw,
@@ -83,12 +113,15 @@ void add_edge_point(const PathContext& context, const PathVertex& vertex, const 
   const EdgeSample& sample = draw.sample;
   TermCost& cost = sink.cost();
   EdgeView view;
-  const bool seen = view_edge(draw.mesh, sample.edge, sample.t, vertex.surface.p, view);
+  const Vec3d from = draw.way ? draw.way->image : vertex.surface.p;
+  const bool seen = view_edge(draw.mesh, sample.edge, sample.t, from, view);
   if (sink.log()) log_point(sample, view.distance, *sink.log());
-  const BoundaryForm form = form_of(context.scene, vertex, draw, view);
+  BoundaryForm form = form_of(context.scene, vertex, draw, view);
+  Ray ray{from, view.omega};
+  if (draw.way && seen) ray = leaving_by(*context.flat_mirrors, vertex, *draw.way, view.y, form);
   // A density may round to zero at the very horizon.
   const bool counts = seen && sample.pdf_t > 0 && sink.takes(form, draw.key);
-  const Rgb<double> f = counts ? vertex.scattered(view.omega) : Rgb<double>{};
+  const Rgb<double> f = counts ? vertex.scattered(ray.direction) : Rgb<double>{};
   if (is_black(f)) {
     ++cost.zero_weight;
     if (sink.log()) sink.log()->push_back("    no weight");
@@ -102,9 +135,11 @@ void add_edge_point(const PathContext& context, const PathVertex& vertex, const 
   }
   RayCount rays;
   Rgb<double> jump;
-  const bool visible = edge_difference(context, draw.mesh, view, vertex.surface.start(), 0,
-                                       std::numeric_limits<double>::infinity(), vertex.bounces + 1,
-                                       draw.key, rays, jump, draw.part);
+  const bool visible = draw.way
+                           ? mirrored_difference(context, vertex, draw, ray, rays, form, jump)
+                           : edge_difference(context, draw.mesh, view, vertex.surface.start(), 0,
+                                             std::numeric_limits<double>::infinity(),
+                                             vertex.bounces + 1, draw.key, rays, jump, draw.part);
   cost.add(rays);
   const Rgb<double> amount = visible ? scattered * jump : Rgb<double>{};
   if (draw.roulette) sink.traced(scattered, rays, amount);

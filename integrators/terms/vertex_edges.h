@@ -1,6 +1,7 @@
 #pragma once
 // A vertex of a path as edge samplers see it, and what a point on an edge adds there.
 #include "integrators/terms/edge_difference.h"
+#include "integrators/terms/mirror_sight.h"
 #include "integrators/terms/term.h"
 #include "limn/edgetree/edge_sampler.h"
 
@@ -19,6 +20,12 @@ struct SeenAlong {
   double distance;
 };
 
+// By way of which flat mirrors a vertex sees an edge, and where its image in them is.
+struct MirrorWay {
+  const FlatMirrors::Chain& chain;
+  Vec3d image;
+};
+
 // A point that was drawn on an edge, for a vertex.
 struct EdgeDraw {
   const EdgeMesh& mesh;
@@ -29,6 +36,7 @@ struct EdgeDraw {
   bool held = false;
   bool roulette = false;             // draws of little are left out by chance
   const SeenAlong* along = nullptr;  // null: the vertex is the sink's viewer
+  const MirrorWay* way = nullptr;    // null: the vertex sees the edge itself
 };
 
 // Hands on what a point on an edge adds to the boundary integral at a vertex, over its density:

@@ -247,7 +247,9 @@ TEST_P(ClosedFormWarped, IsNearlyExact) {
 std::vector<std::string> files_with_boundary() {
   std::vector<std::string> files;
   for (const json& reference : references()) {
-    if (has_boundary(reference)) files.push_back(reference["file"]);
+    if (has_boundary(reference) && takes(*Method("was"), reference["file"])) {
+      files.push_back(reference["file"]);
+    }
   }
   return files;
 }

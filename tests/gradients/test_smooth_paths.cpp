@@ -138,7 +138,7 @@ TEST(SmoothPaths, MissingEdgesAreTold) {
   bool told = false;
   for (const std::string& line : moved.gradient.warnings) {
     told = told || (line.find("edges seen by way of smooth lobes of") != std::string::npos &&
-                    line.find("plate") != std::string::npos);
+                    line.find("\"ball\"") != std::string::npos);
   }
   EXPECT_TRUE(told);
   EXPECT_FALSE(run_check(scene, "ground.reflectance", 8).gradient.incomplete);

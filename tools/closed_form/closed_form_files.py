@@ -73,6 +73,9 @@ def bsdf_xml(bsdf):
     if bsdf.kind == "diffuse":
         return (f'  <bsdf type="diffuse" id="{bsdf.id}">'
                 f'{rgb("reflectance", bsdf.reflectance)}</bsdf>\n')
+    if bsdf.kind == "mirror":
+        return (f'  <bsdf type="conductor" id="{bsdf.id}">\n    <rgb name="eta" value="0"/>'
+                f'<rgb name="k" value="1"/>{rgb("specular_reflectance", bsdf.reflectance)}\n  </bsdf>\n')
     return (f'  <bsdf type="roughconductor" id="{bsdf.id}">\n'
             f'    <rgb name="eta" value="0"/><rgb name="k" value="1"/>\n'
             f'    <string name="distribution" value="{bsdf.kind}"/>'

@@ -33,7 +33,8 @@ class Shape:
 
 @dataclass
 class Bsdf:
-    """kind: diffuse, ggx or beckmann (roughconductor with eta 0, k 1, so Fresnel = 1).
+    """kind: diffuse, ggx or beckmann (roughconductor with eta 0, k 1, so Fresnel = 1), or mirror (a
+    conductor with these).
 
     colors: 2 by 3, of a checkerboard in the place of the reflectance; its squares are halves of uv.
     """
@@ -150,12 +151,13 @@ def moved(scene, name, step):
         move_camera(scene.camera, what, axis, step)
     elif owner in scene.lights:
         move_light(scene.lights[owner], what, axis, step)
-    elif what in ("reflectance", "alpha"):
+    elif what in ("reflectance", "specular_reflectance", "alpha"):
         bsdf = next(s.bsdf for s in scene.shapes.values() if s.bsdf and s.bsdf.id == owner)
         if rest:  # color0 or color1
             bsdf.colors[int(rest[0][-1])] += step
         else:
-            setattr(bsdf, what, getattr(bsdf, what) + step)
+            field_name = what.removeprefix("specular_")
+            setattr(bsdf, field_name, getattr(bsdf, field_name) + step)
     elif what == "radiance":
         if owner == "environment":
             scene.environment = scene.environment + step
@@ -214,6 +216,12 @@ def move_shape(scene, shape, what, axis, step):
 def loop_normal(loop):
     """Unit normal of a planar convex loop, towards the side from which it is counter-clockwise."""
     return unit(np.cross(loop[1] - loop[0], loop[2] - loop[0]))
+
+
+def mirrored(points, loop):
+    """The images of points (N by 3) in the plane of `loop`."""
+    normal = loop_normal(loop)
+    return points - 2 * ((points - loop[0]) @ normal)[:, None] * normal
 
 
 def hit_plane(camera, film, loop):

@@ -12,7 +12,7 @@ All three moved together give the picture of the moved scene, so the terms add u
 import numpy as np
 
 from closed_form_geometry import (clip, clip_box, clip_convex, hit_plane, loop_normal, loop_rule,
-                                  ramp, shadow_on_plane, square_rule, squares, unit)
+                                  mirrored, ramp, shadow_on_plane, square_rule, squares, unit)
 from closed_form_radiance import (Filter, convex_vector, lobe, lobe_over_polygon, polygon_area,
                                   polygon_vector)
 
@@ -93,6 +93,31 @@ class HalfHiddenLamp(FloorModel):
         emitter, floor = shade.shapes["lamp"], shade.shapes["floor"]
         irradiance = (phi @ floor_normal(shade))[:, None] * emitter.radiance
         return irradiance * floor.bsdf.reflectance / np.pi
+
+
+class LampInMirror(FloorModel):
+    """A lamp over a diffuse plane, which sees it also in the flat shape "mirror" of reflectance R:
+    L = rho / pi L_e (n.Phi(lamp) + R n.Phi(the lamp's image cut by the mirror as p sees it))."""
+
+    def radiance(self, shade, outline, p, viewer, order):
+        lamp, window = lamp_loop(outline, p), outline.shapes["mirror"].face(0)
+        image = mirrored(lamp, window)[::-1]
+        phi, patterns = np.zeros_like(p), set()
+        for k, point in enumerate(p):
+            seen, pattern = image, []
+            for a, b in zip(window, np.roll(window, -1, axis=0)):
+                side = np.cross(a - point, b - point)
+                side = side * np.sign(np.dot(window.mean(axis=0) - point, side))
+                pattern += [*((image - point) @ side > 0)]
+                seen = clip(seen, side, np.dot(point, side))
+            patterns.add((len(seen), *pattern))
+            phi[k] = polygon_vector(point[None], seen)[0]
+        assert len(patterns) == 1, "the clipped image changes within a pixel"
+        share = shade.shapes["mirror"].bsdf.reflectance
+        irradiance = (polygon_vector(p, lamp) @ floor_normal(shade))[:, None]
+        irradiance = irradiance + (phi @ floor_normal(shade))[:, None] * share
+        return (irradiance * shade.shapes["lamp"].radiance
+                * shade.shapes["floor"].bsdf.reflectance / np.pi)
 
 
 def faces_before(shape, eye, loop):
@@ -346,6 +371,34 @@ class LampsInView:
             shown = cover(far, at) - cover(both, at)
             return (sky + (shade.shapes["near"].radiance - sky) * cover(near, at)
                     + (shade.shapes["far"].radiance - sky) * shown)
+
+        return pixels(camera, mean)
+
+
+class LampsInMirror:
+    """Shapes "near" and "far" emit; the camera sees them in the flat shape "mirror" of reflectance R
+    alone, before a constant sky. With m the mirror on the film,
+
+    I = L_sky + c(m) (R - 1) L_sky + R ((L_near - L_sky) c(near and m)
+        + (L_far - L_sky) (c(far and m) - c(near and far and m))).
+    """
+
+    outlines_in_view = True
+
+    def image(self, domain, shade, outline, shadow, order):
+        camera, sky, shapes = domain.camera, shade.environment, domain.shapes
+        mirror = film_loop(domain, shapes["mirror"].face(0))
+        near, far = (clip_convex(film_loop(domain, mirrored(
+            shapes[name].face(0), shapes["mirror"].face(0))), mirror) for name in ("near", "far"))
+        both, cover = clip_convex(far, near), Filter(camera.filter).over_polygon
+        share = shade.shapes["mirror"].bsdf.reflectance
+
+        def mean(corner):
+            at = corner + 0.5
+            shown = cover(far, at) - cover(both, at)
+            return (sky + (share - 1) * sky * cover(mirror, at)
+                    + share * (shade.shapes["near"].radiance - sky) * cover(near, at)
+                    + share * (shade.shapes["far"].radiance - sky) * shown)
 
         return pixels(camera, mean)
 

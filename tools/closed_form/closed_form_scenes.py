@@ -151,6 +151,39 @@ def lamps_in_view(kind):
     return scene, models.LampsInView(), names
 
 
+def square_in_mirror():
+    """Two lamps behind the camera, in a flat mirror in front of it that shows a part of one."""
+    camera = Camera(vector(0.625, 0.625, -3.9375), vector(0.375, 0.1875, -0.1875), vector(0, 1, 0),
+                    30, 4, 4)
+    mirror = parallelogram((-0.5, -0.71875, -0.21875), (-0.078125, 1.28125, 0.296875),
+                           (1.546875, 0.296875, 0.140625))
+    mirror.bsdf = Bsdf("mirror_bsdf", "mirror", vector(0.75, 0.5, 0.875))
+    near = lamp(parallelogram((0.25, 0.6875, -4.125), (1, 0.125, -0.5), (0.0625, 1.6875, 0.25)),
+                (3, 1, 0.5), "near")
+    far = lamp(parallelogram((0.8125, 1.4375, -6.125), (2.5625, -0.0625, 0.5625),
+                             (0.25, 1.875, 0.8125)), (0.5, 2, 4), "far")
+    scene = Scene("square_in_mirror.xml", camera, {"mirror": mirror, "near": near, "far": far}, 2,
+                  vector(0.25, 0.5, 1))
+    names = SENSOR + moves_of("mirror") + moves_of("near") + moves_of("far")
+    names += ["near_emitter.radiance", "far_emitter.radiance", "environment.radiance",
+              "mirror_bsdf.specular_reflectance"]
+    return scene, models.LampsInMirror(), names
+
+
+def lamp_in_mirror():
+    """The floor sees a part of the lamp in a mirror beside it, too."""
+    mirror = parallelogram((-1.5, 0.125, 0), (0.125, 1.25, 0), (0.0625, 0.125, 2))
+    mirror.bsdf = Bsdf("mirror_bsdf", "mirror", vector(0.75, 0.5, 0.875))
+    shapes = {"floor": floor(), "mirror": mirror,
+              "lamp": lamp(parallelogram((-0.75, 1.75, -0.75), (1, -0.75, 0), (0, 0.125, 1.75)),
+                           (4, 2, 1))}
+    scene = Scene("lamp_in_mirror.xml", floor_camera((1, 1)), shapes, 3)
+    names = moves_of("mirror") + ["lamp.translate.x", "lamp.translate.y", "lamp.rotate.z",
+                                  "floor.translate.y", "floor.rotate.x", "sensor.translate.x",
+                                  "lamp_emitter.radiance", "mirror_bsdf.specular_reflectance"]
+    return scene, models.LampInMirror(), names
+
+
 def crossing_in_view():
     camera = Camera(vector(0.375, 0.5, -3.9375), vector(0.5, 0.25, -0.1875), vector(0, 1, 0), 30, 4,
                     4)
@@ -328,6 +361,8 @@ SCENES = {
     "lamps_in_view_box": lambda: lamps_in_view("box"),
     "lamps_in_view_tent": lambda: lamps_in_view("tent"),
     "lamps_in_view_gaussian": lambda: lamps_in_view("gaussian"),
+    "square_in_mirror": square_in_mirror,
+    "lamp_in_mirror": lamp_in_mirror,
     "crossing_in_view": crossing_in_view,
     "crossing_over_plane": crossing_over_plane,
     "lamp_in_ggx": lambda: lamp_in_gloss("ggx", 0.1),

@@ -1,0 +1,158 @@
+// Which flat parts of surfaces are mirrors.
+#include "integrators/edges/flat_mirrors.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "limn/core/bounds.h"
+#include "limn/core/surface_point.h"
+
+namespace limn {
+namespace {
+
+// How far a plane's points may lie off it, over the size of the mesh, their speeds, over the
+// largest there, and unit vectors. Not tuned.
+constexpr double kFlat = 0x1p-16;
+
+Rgb<double> reflectance(const Shape& shape, bool front) {
+  const Bsdf* side = shape.bsdf->side(front);
+  if (!side || !side->lobes().smooth) return {};
+  const Vec3d n{0, 0, 1};
+  SmoothRays<double> rays;
+  const int count = side->smooth_rays(n, n, rays);
+  return mirrored_share({rays.data(), static_cast<size_t>(count)}, n, n);
+}
+
+// Whether shading normals are those of the face.
+bool is_flat(const Mesh& mesh, FaceId face, const Vec3d& n) {
+  if (mesh.normal_source == NormalSource::kFace) return true;
+  const auto normals = detail::corner_normals<double>(mesh, face);
+  return std::all_of(normals.begin(), normals.end(), [&](const Vec3d& corner) {
+    return length(cross(corner, n)) <= kFlat * length(corner);
+  });
+}
+
+// What lengths and speeds of a mesh are compared with.
+struct Scale {
+  double length = 0;
+  Lanes speed{};
+
+  explicit Scale(const Mesh& mesh) {
+    Bounds bounds;
+    for (const Vec3f& p : mesh.positions) bounds.extend(cast<double>(p));
+    length = bounds.diagonal();
+    for (const Vec3<Lanes>& v : mesh.position_tangents) {
+      for (int k = 0; k < kLanes; ++k) {
+        speed[k] = std::max(speed[k], std::hypot(v.x[k], v.y[k], v.z[k]));
+      }
+    }
+  }
+  // Whether the point lies in the plane, and moves with it.
+  bool holds(const MirrorPlane<Dual>& plane, const Vec3<Dual>& x) const {
+    const Dual d = plane.distance(x);
+    bool together = std::fabs(d.v) <= kFlat * length;
+    for (int k = 0; k < kLanes; ++k) together &= std::fabs(d.d[k]) <= kFlat * speed[k];
+    return together;
+  }
+};
+
+}  // namespace
+
+bool is_mirrored(const Vec3d& n, const Vec3d& wi, const Vec3d& wo) {
+  return length(wo + wi - n * (2 * dot(n, wi))) <= 2 * kFlat;
+}
+
+Rgb<double> mirrored_share(std::span<const SmoothRay<double>> rays, const Vec3d& n,
+                           const Vec3d& wi) {
+  Rgb<double> sum;
+  for (const SmoothRay<double>& ray : rays) {
+    if (!(dot(ray.wo, n) > 0)) continue;
+    if (!is_mirrored(n, wi, ray.wo)) return {};
+    sum = sum + ray.weight;
+  }
+  return sum;
+}
+
+std::unique_ptr<const FlatMirrors> FlatMirrors::make(const Scene& scene) {
+  std::unique_ptr<FlatMirrors> result(new FlatMirrors(scene));
+  std::vector<Mirror>& mirrors = result->mirrors_;
+  for (uint32_t s = 0; s < scene.shapes.size(); ++s) result->add_shape(ShapeId(s), mirrors);
+  if (mirrors.empty()) return nullptr;
+  std::stable_sort(mirrors.begin(), mirrors.end(), [](const Mirror& a, const Mirror& b) {
+    return a.area * a.share > b.area * b.share;
+  });
+  if (mirrors.size() > kMost) mirrors.erase(mirrors.begin() + kMost, mirrors.end());
+  const auto count = static_cast<uint32_t>(mirrors.size());
+  for (uint32_t a = 0; a < count; ++a) result->chains_.push_back({{a, 0}, 1});
+  for (uint32_t a = 0; a < count; ++a) {
+    for (uint32_t b = 0; b < count; ++b) {
+      if (a != b) result->chains_.push_back({{a, b}, 2});
+    }
+  }
+  return result;
+}
+
+void FlatMirrors::add_shape(ShapeId id, std::vector<Mirror>& found) const {
+  const Shape& shape = scene_.shape(id);
+  const double share =
+      std::max(luminance(reflectance(shape, true)), luminance(reflectance(shape, false)));
+  if (!(share > 0)) return;
+  const Scale scale(shape.mesh);
+  const size_t first = found.size();
+  for (uint32_t f = 0; f < shape.mesh.faces.size(); ++f) {
+    const auto corners = face_corners<Dual>(shape.mesh, FaceId(f));
+    const Vec3d area = value(cross(corners[1] - corners[0], corners[2] - corners[0]));
+    if (!(length(area) > 0) || !is_flat(shape.mesh, FaceId(f), normalize(area))) continue;
+    const auto lies_in = [&](const Mirror& mirror) {
+      return dot(value(mirror.plane.n), area) > 0 &&
+             std::all_of(corners.begin(), corners.end(),
+                         [&](const auto& x) { return scale.holds(mirror.plane, x); });
+    };
+    auto mirror =
+        std::find_if(found.begin() + static_cast<std::ptrdiff_t>(first), found.end(), lies_in);
+    if (mirror == found.end())
+      mirror = found.insert(mirror, {MirrorPlane<Dual>::through(corners), {}, {}, 0, share});
+    mirror->faces.push_back({id, FaceId(f)});
+    const Vec3d middle = value(corners[0] + corners[1] + corners[2]) / 3.0;
+    const double size = 0.5 * length(area);
+    mirror->center = mirror->center + (middle - mirror->center) * (size / (mirror->area + size));
+    mirror->area += size;
+  }
+}
+
+uint32_t FlatMirrors::of(FaceRef face) const {
+  for (uint32_t m = 0; m < mirrors_.size(); ++m) {
+    const std::vector<FaceRef>& faces = mirrors_[m].faces;
+    if (faces[0].shape != face.shape) continue;
+    const auto at = std::lower_bound(faces.begin(), faces.end(), face, [](FaceRef a, FaceRef b) {
+      return a.face.index() < b.face.index();
+    });
+    if (at != faces.end() && *at == face) return m;
+  }
+  return kNone;
+}
+
+MirrorPlane<double> FlatMirrors::plane(uint32_t mirror) const {
+  const FaceRef face = mirrors_[mirror].faces[0];
+  return MirrorPlane<double>::through(
+      face_corners<double>(scene_.shape(face.shape).mesh, face.face));
+}
+
+bool FlatMirrors::reflects_to(uint32_t mirror, const Vec3d& p) const {
+  const Shape& shape = scene_.shape(mirrors_[mirror].faces[0].shape);
+  return luminance(reflectance(shape, plane(mirror).distance(p) > 0)) > 0;
+}
+
+Camera image_of(const Camera& camera, const MirrorPlane<Dual>& plane) {
+  Camera image = camera;
+  image.origin = plane.image(camera.origin);
+  image.left = plane.turned(camera.left);
+  image.up = plane.turned(camera.up);
+  image.forward = plane.turned(camera.forward);
+  image.near_clip = 0;
+  image.far_clip = std::numeric_limits<double>::infinity();
+  return image;
+}
+
+}  // namespace limn

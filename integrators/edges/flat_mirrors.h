@@ -1,0 +1,112 @@
+#pragma once
+// Flat parts of surfaces with smooth lobes, and the images that they show. In the mirror
+// {x : n.x = h} a point p sees an edge where its image p* = p + 2 (h - n.p) n would see it, without
+// the mirror, in the direction M w of p's own direction w, M = 1 - 2 n n^T. M keeps lengths and
+// angles, so all that is known of edges that p sees holds for those that p* sees; only the segments
+// from p to the mirror and from there to the edge tell what hides them. In a chain of mirrors the
+// images are taken one after the other.
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "limn/core/camera.h"
+#include "limn/core/scene.h"
+
+namespace limn {
+
+// The plane of a face, which may move.
+template <class S>
+struct MirrorPlane {
+  Vec3<S> point, n;  // of it; unit
+
+  static MirrorPlane through(const std::array<Vec3<S>, 3>& c) {
+    return {c[0], normalize(cross(c[1] - c[0], c[2] - c[0]))};
+  }
+  S distance(const Vec3<S>& x) const { return dot(n, x - point); }
+  // The image of a point, and of a direction.
+  Vec3<S> image(const Vec3<S>& x) const { return x - n * (2.0 * distance(x)); }
+  Vec3<S> turned(const Vec3<S>& w) const { return w - n * (2.0 * dot(n, w)); }
+};
+
+// The same at rest.
+inline MirrorPlane<Dual> at_rest(const MirrorPlane<double>& plane) {
+  const auto& [x, n] = plane;
+  return {{x.x, x.y, x.z}, {n.x, n.y, n.z}};
+}
+
+class FlatMirrors {
+ public:
+  // Those with the largest product of area and reflectance. Not tuned.
+  static constexpr size_t kMost = 4;
+  static constexpr size_t kLongest = 2;  // of a chain
+
+  // Faces of one shape in one plane, which moves as one.
+  struct Mirror {
+    MirrorPlane<Dual> plane;  // of the first face
+    std::vector<FaceRef> faces;
+    Vec3d center{};  // of the faces, by their areas
+    double area = 0;
+    double share = 0;  // of light that it reflects, along its normal
+  };
+  // In the order in which a path from the viewer meets them.
+  struct Chain {
+    std::array<uint32_t, kLongest> mirrors{};
+    uint32_t count = 0;
+  };
+
+  // scene: with its parameters seeded; it must outlive this. Null where there is no such part.
+  static std::unique_ptr<const FlatMirrors> make(const Scene& scene);
+
+  std::span<const Mirror> mirrors() const { return mirrors_; }
+  // Of one mirror each, then of two different ones.
+  std::span<const Chain> chains() const { return chains_; }
+  // Which mirror a face belongs to; kNone.
+  static constexpr uint32_t kNone = UINT32_MAX;
+  uint32_t of(FaceRef face) const;
+  // The plane, at rest.
+  MirrorPlane<double> plane(uint32_t mirror) const;
+  // Whether a point is on a side of the mirror that reflects.
+  bool reflects_to(uint32_t mirror, const Vec3d& p) const;
+
+ private:
+  explicit FlatMirrors(const Scene& scene) : scene_(scene) {}
+  void add_shape(ShapeId shape, std::vector<Mirror>& found) const;
+
+  const Scene& scene_;
+  std::vector<Mirror> mirrors_;
+  std::vector<Chain> chains_;
+};
+
+// The faces of a chain's mirrors on which a ray was reflected.
+struct MirrorFaces {
+  std::array<FaceRef, FlatMirrors::kLongest> faces;
+  uint32_t count = 0;
+
+  std::span<const FaceRef> all() const { return {faces.data(), count}; }
+};
+
+// The image of a ray. corners: gives those of a face, in S.
+template <class S, class Corners>
+void reflect_ray(const MirrorFaces& by, const Corners& corners, Vec3<S>& origin,
+                 Vec3<S>& direction) {
+  for (const FaceRef face : by.all()) {
+    const auto plane = MirrorPlane<S>::through(corners(face));
+    origin = plane.image(origin);
+    direction = plane.turned(direction);
+  }
+}
+
+// The camera's image: positions on the film stay. It has no clip planes, as they are about rays
+// before they are reflected.
+Camera image_of(const Camera& camera, const MirrorPlane<Dual>& plane);
+
+// Whether the unit direction wo is that in which a flat mirror of unit normal n reflects wi.
+bool is_mirrored(const Vec3d& n, const Vec3d& wi, const Vec3d& wo);
+// The light that a surface seen along wi reflects as a flat mirror does, of unit normal n on the
+// side of wi; black where another smooth ray leaves to that side.
+Rgb<double> mirrored_share(std::span<const SmoothRay<double>> rays, const Vec3d& n,
+                           const Vec3d& wi);
+
+}  // namespace limn

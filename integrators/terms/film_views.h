@@ -1,0 +1,57 @@
+#pragma once
+// From where the camera sees edges: itself, and a pinhole's images in chains of flat mirrors.
+#include <algorithm>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "integrators/edges/flat_mirrors.h"
+#include "integrators/edges/viewpoint.h"
+#include "integrators/paths/path_context.h"
+
+namespace limn {
+
+// Cuts the parameter range [s0, s1] of a + s d to where it lies in [lower, upper] (Liang and
+// Barsky). False if nothing is left.
+bool clip_range(double a, double d, double lower, double upper, double& s0, double& s1);
+
+// A part of the film [pixels].
+struct FilmWindow {
+  double x0, y0, x1, y1;
+
+  // Cuts the segment from (from_x, from_y) to (to_x, to_y) likewise.
+  bool clip(double from_x, double to_x, double from_y, double to_y, double& s0, double& s1) const {
+    return clip_range(from_x, to_x - from_x, x0, x1, s0, s1) &&
+           clip_range(from_y, to_y - from_y, y0, y1, s0, s1);
+  }
+};
+
+// Where a film position can matter to a pixel of the crop window.
+FilmWindow sampled_window(const Film& film);
+
+struct FilmView {
+  FlatMirrors::Chain chain;  // empty: the camera itself
+  Camera camera;             // its image
+  const Viewpoint* viewpoint;
+  std::unique_ptr<const Viewpoint> own_viewpoint = nullptr;  // of an image
+  FilmWindow window;                                         // no more than this is seen
+  // Of an edge only what lies on the side of the last mirror that this is not on is seen.
+  const FlatMirrors* mirrors = nullptr;
+
+  bool direct() const { return chain.count == 0; }
+  uint32_t last_mirror() const { return chain.mirrors[chain.count - 1]; }
+  // Whether one of the faces is of the last mirror: an edge of it lies in it, and is its own image.
+  bool touches_mirror(std::span<const FaceRef> faces) const {
+    return !direct() && std::ranges::any_of(faces, [&](FaceRef face) {
+      return mirrors->of(face) == last_mirror();
+    });
+  }
+  // Cuts the segment from a to b to what lies before the last mirror.
+  bool clip_to_mirror(const Vec3d& a, const Vec3d& b, double& t0, double& t1) const;
+};
+
+// The camera, then its images in chains of mirrors that may show it something. held: the mirrors'
+// motion is left out.
+std::vector<FilmView> list_film_views(const PathContext& context, bool held);
+
+}  // namespace limn
