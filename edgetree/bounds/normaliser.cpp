@@ -1,5 +1,5 @@
-// The hyperplane onto which the planes of a node are projected, from normals alone, from the planes'
-// hull or by a linear program.
+// The hyperplane onto which the planes of a node are projected, from normals alone, from the
+// planes' hull or by a linear program.
 #include "edgetree/bounds/normaliser.h"
 
 #include <Eigen/Dense>

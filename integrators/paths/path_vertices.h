@@ -16,7 +16,7 @@ inline bool PathTracer<S, Visitor>::begin_vertex(Walk& walk) {
   walk.scattering.emplace(walk.surface, walk.wi, c_.scene.shading);
   if (walk.scattering->black()) return false;
   if (c_.unmoved && walk.scattering->is_smooth()) {
-    walk.scattering->share_by(SmoothShares::By::kNone);
+    walk.scattering->share_by(SmoothShares::By::kSteps);
   }
   set_motion(walk);
   walk.light.reset();

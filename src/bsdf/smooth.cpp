@@ -5,6 +5,31 @@
 
 namespace limn {
 
+namespace {
+
+// Shares in proportion to .1, .5 or .9, by the weights of the choices. Equal shares would let the
+// weight of a path double at each total reflection that it takes by chance, and again at each
+// surface that it passes: inside of glass no number of samples would do.
+SmoothShares in_steps(const SmoothRays<double>& rays, const SmoothShares& weights, bool rough,
+                      double sum) {
+  const auto step = [&](double weight) {
+    return weight < 0.25 * sum ? 0.1 : weight < 0.75 * sum ? 0.5 : 0.9;
+  };
+  SmoothShares shares = weights;
+  double total = rough ? step(shares.rough) : 0;
+  shares.rough = total;
+  for (int k = 0; k < shares.count; ++k) {
+    shares.ray[k] = rays[k].total ? 0 : step(weights.ray[k]);
+    total += shares.ray[k];
+  }
+  if (!(total > 0)) return shares;
+  shares.rough /= total;
+  for (double& share : shares.ray) share /= total;
+  return shares;
+}
+
+}  // namespace
+
 SmoothShares smooth_shares(const Bsdf& bsdf, const Vec3d& n, const Vec3d& wi, const Rgb<double>* at,
                            SmoothShares::By by) {
   // Where light passes a surface less and less, up to the critical angle, its derivative grows
@@ -15,11 +40,6 @@ SmoothShares smooth_shares(const Bsdf& bsdf, const Vec3d& n, const Vec3d& wi, co
   SmoothShares shares;
   shares.count = bsdf.smooth_rays(n, wi, rays, at);
   const int rough = bsdf.is_rough() ? 1 : 0;
-  if (by == SmoothShares::By::kNone) {
-    shares.rough = rough / static_cast<double>(shares.count + rough);
-    std::fill_n(shares.ray.begin(), shares.count, 1.0 / (shares.count + rough));
-    return shares;
-  }
   double smooth = 0;
   for (int k = 0; k < shares.count; ++k) {
     // Without what refraction scales radiance by.
@@ -27,6 +47,7 @@ SmoothShares smooth_shares(const Bsdf& bsdf, const Vec3d& n, const Vec3d& wi, co
     smooth += shares.ray[k];
   }
   shares.rough = rough ? std::clamp(1 - smooth, 0.0, bsdf.lobe(at).albedo) : 0;
+  if (by == SmoothShares::By::kSteps) return in_steps(rays, shares, rough, smooth + shares.rough);
   const double sum = smooth + shares.rough;
   int choices = rough;
   for (int k = 0; k < shares.count; ++k) choices += !rays[k].total;

@@ -4,6 +4,7 @@ import os
 import subprocess
 
 import limn
+import numpy as np
 import pytest
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
@@ -76,3 +77,8 @@ def program(folder):
         return limn.read_exr(output)
 
     return run
+
+
+@pytest.fixture
+def adjoint(scene):
+    return np.random.default_rng(3).normal(size=(scene.height, scene.width, 3)).astype(np.float32)

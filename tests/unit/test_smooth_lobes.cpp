@@ -122,7 +122,7 @@ TEST(SmoothLobes, SharesAreProbabilities) {
   for_every_side([](const SmoothCase& c, bool, const Bsdf& bsdf, const Vec3d& wi) {
     SmoothRays<double> rays;
     const int count = bsdf.smooth_rays(kNormal, wi, rays);
-    for (const By by : {By::kWeight, By::kSlope, By::kNone}) {
+    for (const By by : {By::kWeight, By::kSlope, By::kSteps}) {
       const SmoothShares shares = smooth_shares(bsdf, kNormal, wi, nullptr, by);
       ASSERT_EQ(shares.count, count);
       double sum = shares.rough;
@@ -132,12 +132,32 @@ TEST(SmoothLobes, SharesAreProbabilities) {
           EXPECT_EQ(shares.ray[k] > 0, !is_black(rays[k].weight)) << c.name;
         } else if (by == By::kSlope && !rays[k].total) {
           EXPECT_GE(shares.ray[k], 0.1) << c.name;
+        } else if (by == By::kSteps) {
+          EXPECT_EQ(shares.ray[k] > 0, !rays[k].total) << c.name;
         }
       }
       EXPECT_NEAR(sum, 1, 1e-14) << c.name;
       EXPECT_EQ(shares.rough > 0, bsdf.is_rough() && (by != By::kWeight || shares.rough > 0))
           << c.name;
     }
+  });
+}
+
+// Where a path takes rays by shares in steps, the mean square of its weight is at most 1.5 times
+// its squared mean. With equal shares it would be twice that where nearly all light goes one way.
+TEST(SmoothLobes, SharesInStepsKeepWeightsEven) {
+  for_every_side([](const SmoothCase& c, bool, const Bsdf& bsdf, const Vec3d& wi) {
+    if (bsdf.is_rough()) return;
+    SmoothRays<double> rays;
+    const int count = bsdf.smooth_rays(kNormal, wi, rays);
+    const SmoothShares shares = smooth_shares(bsdf, kNormal, wi, nullptr, SmoothShares::By::kSteps);
+    double sum = 0, square = 0;
+    for (int k = 0; k < count; ++k) {
+      const double weight = max_channel(rays[k].weight) * (rays[k].eta * rays[k].eta);
+      sum += weight;
+      if (shares.ray[k] > 0) square += weight * weight / shares.ray[k];
+    }
+    EXPECT_LE(square, 1.5 * sum * sum) << c.name;
   });
 }
 

@@ -24,7 +24,11 @@ Estimate to_estimate(const ParameterAdjoint& adjoint, const BackwardResult& resu
   Numbers errors = variances(adjoint.moments);
   for (double& e : errors) e = std::sqrt(e);
   return {to_array(means(adjoint.moments), adjoint.shape),
-          to_array(std::move(errors), adjoint.shape), result.spp, result.seconds, result.warnings};
+          to_array(std::move(errors), adjoint.shape),
+          result.spp,
+          result.seconds,
+          result.warnings,
+          true};
 }
 
 struct BackwardCall {

@@ -49,6 +49,7 @@ class SceneHandle {
 // Each group adds its names to the module.
 nb::class_<SceneHandle> bind_scene(nb::module_& m);
 void bind_parameters(nb::module_& m, nb::class_<SceneHandle>& scene);
+void bind_geometry(nb::class_<SceneHandle>& scene);
 void bind_parts(nb::module_& m);
 void bind_render(nb::module_& m);
 void bind_gradient(nb::module_& m);
@@ -87,6 +88,7 @@ struct Estimate {
   int64_t spp = 0;
   double seconds = 0;
   std::vector<std::string> warnings;
+  bool is_derivative = false;
 };
 Estimate to_estimate(const Moments& moments, const Film& film, int64_t spp, double seconds);
 

@@ -64,6 +64,7 @@ struct GradientCall {
     for (const ParameterGradient& g : result.parameters) {
       Estimate estimate = to_estimate(g.total, shared->film, result.spp, result.seconds);
       estimate.warnings = result.warnings;
+      estimate.is_derivative = true;
       estimates[nb::cast(g.name)] = nb::cast(std::move(estimate));
     }
     check_finite(result.non_finite, estimates);

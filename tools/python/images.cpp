@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <filesystem>
 
 #include "limn/core/error.h"
 #include "tools/python/bindings.h"
@@ -43,7 +44,25 @@ Pixels to_array(Image image) {
   return Pixels(owned->data.data(), 3, shape, owner);
 }
 
+namespace {
+
+// A file's path that ends in `ending`; InputError for another one.
+std::string to_file(nb::handle path, const std::string& ending) {
+  std::string file = to_path("file", path);
+  const std::string last = std::filesystem::path(file).extension().string();
+  if (last == ending) return file;
+  throw InputError({file}, "the name of a file of this format ends in " + ending +
+                               "; limn.write_image chooses the format by the ending");
+}
+
+}  // namespace
+
 void bind_images(nb::module_& m) {
+  m.def(
+      "read_image", [](nb::handle file) { return to_array(read_image(to_path("file", file))); },
+      nb::arg("file"), nb::sig("def read_image(file: str | os.PathLike[str]) -> numpy.ndarray"),
+      "Pixels of an EXR, PNG, JPEG, RGBE or BMP image, linear: float32, (H, W, 3) or (H, W, 1). "
+      "Images of eight bits are decoded from sRGB; alpha is dropped.");
   m.def(
       "read_exr", [](nb::handle file) { return to_array(read_exr(to_path("file", file))); },
       nb::arg("file"), nb::sig("def read_exr(file: str | os.PathLike[str]) -> numpy.ndarray"),
@@ -51,7 +70,7 @@ void bind_images(nb::module_& m) {
   m.def(
       "write_exr",
       [](nb::handle file, nb::handle image, bool half) {
-        write_exr(to_path("file", file), to_image(image), half, {});
+        write_exr(to_file(file, ".exr"), to_image(image), half, {});
       },
       nb::arg("file"), nb::arg("image"), nb::arg("half") = false,
       nb::sig("def write_exr(file: str | os.PathLike[str], image: numpy.typing.ArrayLike, half: "
@@ -60,7 +79,7 @@ void bind_images(nb::module_& m) {
   m.def(
       "write_png",
       [](nb::handle file, nb::handle image, double exposure) {
-        write_png(to_path("file", file), to_image(image), exposure);
+        write_png(to_file(file, ".png"), to_image(image), exposure);
       },
       nb::arg("file"), nb::arg("image"), nb::arg("exposure") = 1.0,
       nb::sig(
@@ -71,7 +90,7 @@ void bind_images(nb::module_& m) {
       "write_signed_png",
       [](nb::handle file, nb::handle image, std::optional<double> scale) {
         const Image picture = to_image(image);
-        write_signed_png(to_path("file", file), picture, scale.value_or(signed_scale(picture)));
+        write_signed_png(to_file(file, ".png"), picture, scale.value_or(signed_scale(picture)));
       },
       nb::arg("file"), nb::arg("image"), nb::arg("scale") = nb::none(),
       nb::sig("def write_signed_png(file: str | os.PathLike[str], image: numpy.typing.ArrayLike, "

@@ -26,9 +26,11 @@ void translate(const std::exception_ptr& thrown, void*) {
 NB_MODULE(_limn, m) {
   namespace py = limn::python;
   m.doc() = "Bindings of limn's library; import limn instead.";
+  m.attr("version") = LIMN_VERSION;
   nanobind::register_exception_translator(py::translate);
   auto scene = py::bind_scene(m);
   py::bind_parameters(m, scene);
+  py::bind_geometry(scene);
   py::bind_parts(m);
   py::bind_render(m);
   py::bind_gradient(m);

@@ -12,7 +12,8 @@ Estimate to_estimate(const Moments& moments, const Film& film, int64_t spp, doub
           Array(to_array(standard_error_image(moments, film.crop_width, film.crop_height))),
           spp,
           seconds,
-          {}};
+          {},
+          false};
 }
 
 namespace {
@@ -84,7 +85,15 @@ void bind_operators(nb::class_<Estimate>& estimate) {
         op.name, [name = op.name](const Estimate& e) { return nb::cast(e.value).attr(name)(); },
         nb::sig(op.signature));
   }
+  // mean(), sum(), reshape(), ...
   estimate
+      .def(
+          "__getattr__",
+          [](const Estimate& e, const nb::str& name) {
+            return nb::object(nb::cast(e.value).attr(name));
+          },
+          nb::arg("name"), nb::sig("def __getattr__(self, name: str) -> typing.Any"),
+          "What else numpy's arrays have, of the value: mean, sum, reshape, ...")
       .def(
           "__getitem__",
           [](const Estimate& e, const nb::object& key) {
@@ -117,6 +126,9 @@ void bind_render(nb::module_& m) {
           nb::sig("def stderr(self) -> numpy.ndarray"),
           "Its standard error, of the same shape; NaN with fewer than two batches (spp = 1).")
       .def_ro("spp", &Estimate::spp, "Samples per pixel that were made.")
+      .def_ro("is_derivative", &Estimate::is_derivative,
+              "Whether it is of a derivative, which notebooks show red where it is positive and "
+              "blue where it is negative.")
       .def_ro("seconds", &Estimate::seconds, "Seconds that the run took, set-up included.")
       .def_prop_ro(
           "warnings", [](const Estimate& e) { return e.warnings; },

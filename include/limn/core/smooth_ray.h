@@ -28,7 +28,7 @@ struct SmoothShares {
   enum class By {
     kWeight,  // in proportion to what they scatter
     kSlope,   // also what scatters little: its derivative need not be small
-    kNone,    // all alike: independent of parameters
+    kSteps,   // in a few steps, so that a small step of a parameter seldom changes them
   };
   int count = 0;  // of rays
   std::array<double, kMostSmoothRays> ray{};

@@ -33,7 +33,9 @@ from ._limn import (
     mesh_distance,
     methods,
     read_exr,
+    read_image,
     render,
+    version as __version__,
     write_exr,
     write_png,
     write_signed_png,
@@ -41,6 +43,7 @@ from ._limn import (
 from .dicts import Transform, load_dict
 from .errors import InputError, NonFiniteError, UnknownParameterError
 from .fits import fit
+from .images import write_image
 from .meshes import write_ply
 from .parts import Part, merge, part
 
@@ -78,8 +81,10 @@ __all__ = [
     "methods",
     "part",
     "read_exr",
+    "read_image",
     "render",
     "write_exr",
+    "write_image",
     "write_ply",
     "write_png",
     "write_signed_png",

@@ -33,7 +33,7 @@ TYPES = {
 }
 _TAGS = {type_: tag for tag, types in TYPES.items() for type_ in types}
 # What has parameters to be named.
-_NAMED = {"shape", "bsdf", "emitter"}
+_NAMED = {"shape", "bsdf", "emitter", "sensor"}
 
 Three = Sequence[float] | npt.NDArray[Any]
 

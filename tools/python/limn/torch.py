@@ -18,7 +18,7 @@ import numpy as np
 import torch
 
 from . import Scene, backward as _backward, render as _render
-from .errors import InputError
+from .motions import Motions
 
 __all__ = ["render"]
 
@@ -52,27 +52,28 @@ class _Render(torch.autograd.Function):
         threads: int,
         *tensors: Any,
     ) -> Any:
-        scene = scene.copy()
-        for name, tensor in zip(names, tensors):
-            # Through float64: numpy does not know bfloat16.
-            scene[name] = tensor.detach().to("cpu", torch.float64).numpy()
-        ctx.run = _Held(scene), names, spp_grad, 2 * seed + 1, threads
+        # Through float64: numpy does not know bfloat16.
+        numbers = {n: t.detach().to("cpu", torch.float64).numpy() for n, t in zip(names, tensors)}
+        motions = Motions(scene, numbers)
+        scene = motions.moved(scene)
+        ctx.run = _Held(scene), motions, names, spp_grad, 2 * seed + 1, threads
         ctx.save_for_backward(*tensors)
         return torch.from_numpy(_render(scene, spp, 2 * seed, threads=threads).value)
 
     @staticmethod
     @torch.autograd.function.once_differentiable
     def backward(ctx: Any, adjoint: Any) -> tuple[Any, ...]:
-        held, names, spp, seed, threads = ctx.run
+        held, motions, names, spp, seed, threads = ctx.run
         scene = held.scene
         wanted = [n for n, need in zip(names, ctx.needs_input_grad[6:]) if need]
-        found = (
-            _backward(scene, adjoint.cpu().numpy(), wanted, spp=spp, seed=seed, threads=threads)
-            if wanted
-            else {}
-        )
+        found = {}
+        if wanted:
+            asked = motions.names_for(wanted)
+            slopes = _backward(scene, adjoint.cpu().numpy(), asked, spp=spp, seed=seed,
+                               threads=threads)
+            found = {n: motions.slope(n, slopes, scene) for n in wanted}
         gradients = [
-            _gradient(found[n].value, t) if n in found else None
+            _gradient(found[n], t) if n in found else None
             for n, t in zip(names, ctx.saved_tensors)
         ]
         return (None,) * 6 + tuple(gradients)
@@ -90,8 +91,6 @@ def _check(scene: Scene, values: Mapping[str, torch.Tensor]) -> None:
     if not isinstance(values, Mapping):
         raise TypeError(f"values is a {type(values).__name__}, not a mapping of names to tensors")
     for name, tensor in values.items():
-        if scene[name] is None:
-            raise InputError(f'parameter "{name}" has no value to give')
         if not isinstance(tensor, torch.Tensor):
             raise TypeError(f'values["{name}"] is a {type(tensor).__name__}, not a torch.Tensor')
         if tensor.is_complex():
@@ -110,7 +109,9 @@ def render(
 
     values: tensors of the shapes that scene[name] has, of any real dtype and on any device (the
     image is on the CPU); one number sets all channels of a colour. The scene itself stays as it is.
-    Parameters without a value (rotations of shapes, ...) cannot be given: move the vertices.
+    Of a parameter without a value (motions of a shape, rotations) it is the step by which it moves
+    from where the scene has it; a shape is scaled first, then turned about its center, about one
+    axis, then translated.
     spp, spp_grad: samples per pixel of the image and of its gradient; None: spp_grad as spp, spp as
     the scene says. The image has the seed 2 * seed, the gradient 2 * seed + 1: both are independent,
     so that the gradient is unbiased where the loss is linear in the image. For a squared difference

@@ -1,0 +1,100 @@
+"""Poses, rays and motions of a scene in memory."""
+
+import limn
+import numpy as np
+import pytest
+from limn.motions import Motions
+
+
+def look_at(origin, target):
+    forward = np.subtract(target, origin) / np.linalg.norm(np.subtract(target, origin))
+    left = np.cross([0, 1, 0], forward)
+    left /= np.linalg.norm(left)
+    pose = np.eye(4)
+    pose[:3, :4] = np.stack([left, np.cross(forward, left), forward, origin], axis=1)
+    return pose
+
+
+def test_the_pose_is_that_of_the_file(scene):
+    np.testing.assert_allclose(scene.sensor_to_world, look_at([1, 3, 5], [0, 0.5, 0]), atol=1e-12)
+
+
+def test_a_pose_moves_the_camera(scene):
+    moved = scene.copy()
+    moved.sensor_to_world = look_at([2, 3, 5], [0, 0.5, 0])
+    steps = scene.copy()
+    steps["sensor.translate.x"] = 2
+    assert moved["sensor.translate.x"] == 2 and scene["sensor.translate.x"] == 1
+    assert not np.array_equal(limn.render(moved, spp=1).value, limn.render(steps, spp=1).value)
+    steps.sensor_to_world = moved.sensor_to_world
+    assert np.array_equal(limn.render(moved, spp=1).value, limn.render(steps, spp=1).value)
+
+
+@pytest.mark.parametrize("pose", [2 * np.eye(4), np.full((4, 4), np.nan), np.eye(3),
+                                  np.eye(4) + 1e13 * np.eye(4, k=3)])
+def test_a_pose_that_no_camera_has(scene, pose):
+    before = scene.sensor_to_world
+    with pytest.raises(limn.InputError, match="camera|shape"):
+        scene.sensor_to_world = pose
+    assert np.array_equal(scene.sensor_to_world, before)
+
+
+def test_rays_meet_what_is_there(scene):
+    hits = scene.intersect([[0, 9, 3.5], [0, -9, 3.5], [50, 9, 0]], [[0, -2, 0], [0, 1, 0], [0, -1, 0]])
+    floor = scene.shapes.index("floor")
+    np.testing.assert_allclose(hits["t"][:2], 9)
+    assert hits["t"][2] == np.inf
+    assert hits["shape"].tolist() == [floor, floor, -1] and hits["face"][2] == -1
+    np.testing.assert_allclose(hits["normal"][:2], [[0, 1, 0]] * 2, atol=1e-7)
+    mesh = scene.mesh("floor")
+    a, b, c = mesh.positions[mesh.faces[hits["face"][0]]]
+    u, v = hits["barycentric"][0]
+    np.testing.assert_allclose((1 - u - v) * a + u * b + v * c, [0, 0, 3.5], atol=1e-6)
+
+
+def test_rays_that_are_none(scene):
+    for origins, directions, message in (([[0, 0, 0]], [[0, 0, 0]], "ray 0"),
+                                         ([[0, 0, 0]] * 2, [[0, 0, 1]], "2 origins"),
+                                         ([0, 0, 0], [0, 0, 1], "shape"),
+                                         ([[0, 0, 0], [np.nan, 0, 0]], [[0, 0, 1]] * 2, "ray 1")):
+        with pytest.raises(limn.InputError, match=message):
+            scene.intersect(origins, directions)
+
+
+def test_slopes_of_steps_are_those_of_the_vertices(scene, adjoint):
+    """Where a loss has the slopes g with respect to the vertices, its slope with respect to a motion is
+    the sum of g times the motion's velocity, of the same samples."""
+    angle, grown, along = 0.7, 0.25, -0.3
+    given = {"tent.rotate.y": np.array(angle), "tent.scale": np.array(grown),
+             "tent.translate.x": np.array(along)}
+    before = scene.mesh("tent").positions.astype(float)
+    center = (before.min(axis=0) + before.max(axis=0)) / 2
+    motions = Motions(scene, given)
+    moved = motions.moved(scene)
+    turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
+    from_center = (1 + grown) * (before - center) @ turn.T
+    after = center + [along, 0, 0] + from_center
+    np.testing.assert_allclose(moved.mesh("tent").positions, after, atol=1e-5)
+    names = motions.names_for([*given, "tent.vertex_positions"])
+    slopes = limn.backward(moved, adjoint, names, spp=8)
+    g = slopes["tent.vertex_positions"].value
+    for name, velocity in (("tent.rotate.y", np.cross([0, 1, 0], from_center)),
+                           ("tent.scale", from_center / (1 + grown)),
+                           ("tent.translate.x", np.array([1, 0, 0]) + 0 * before)):
+        np.testing.assert_allclose(motions.slope(name, slopes, moved), (g * velocity).sum(),
+                                   rtol=1e-4, err_msg=name)
+
+
+def test_steps_that_cannot_be_given(scene):
+    for names, message in ((["tent.rotate.x", "tent.rotate.y"], "one axis at a time"),
+                           (["tent.scale", "tent.vertex_positions"], "vertex positions and"),
+                           (["tent.displacement"], "no value to give")):
+        with pytest.raises(limn.InputError, match=message):
+            Motions(scene, {n: np.array(0.1) for n in names})
+
+
+def test_sensors_of_dictionaries_have_names():
+    sensor = {"type": "perspective", "film": {"type": "hdrfilm", "width": 4, "height": 4}}
+    scene = limn.load_dict({"type": "scene", "left": sensor, "right": sensor})
+    assert scene.sensors == ["left", "right"]
+    assert scene.view("right").sensors == ["left", "right"]

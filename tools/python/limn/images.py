@@ -1,0 +1,44 @@
+"""Images as files by their endings, and in notebooks."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+
+import numpy.typing as npt
+
+from ._limn import Estimate, write_exr, write_png, write_signed_png
+from .errors import InputError
+
+
+def write_image(file: str | os.PathLike[str], image: npt.ArrayLike) -> None:
+    """Writes (H, W, 3), (H, W, 1) or (H, W) pixels: .exr as floats, .png as limn.write_png does,
+    and an Estimate of a derivative to .png as limn.write_signed_png does."""
+    ending = os.path.splitext(os.fspath(file))[1]
+    if ending == ".exr":
+        write_exr(file, image)
+    elif ending == ".png":
+        _write_picture(file, image)
+    else:
+        raise InputError(f'{os.fspath(file)}: error: unknown ending "{ending}" (known: .exr, .png)')
+
+
+def _write_picture(file: str | os.PathLike[str], image: npt.ArrayLike) -> None:
+    if isinstance(image, Estimate) and image.is_derivative:
+        write_signed_png(file, image)
+    else:
+        write_png(file, image)
+
+
+def _repr_png(estimate: Estimate) -> bytes | None:
+    """What a notebook shows; None for what is no image."""
+    if len(estimate.shape) != 3:
+        return None
+    with tempfile.TemporaryDirectory(prefix="limn_") as folder:
+        file = os.path.join(folder, "image.png")
+        _write_picture(file, estimate)
+        with open(file, "rb") as stream:
+            return stream.read()
+
+
+setattr(Estimate, "_repr_png_", _repr_png)
