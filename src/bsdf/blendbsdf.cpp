@@ -149,12 +149,9 @@ class Blend final : public NestingBsdf {
 }  // namespace
 
 std::shared_ptr<Bsdf> read_blendbsdf(Properties& properties) {
-  auto texture = read_texture(properties, "weight", 1);
-  if (!texture && !properties.has("weight")) properties.fail("needs a weight");
-  const ConstantOrTexture weight =
-      texture ? ConstantOrTexture(texture)
-              : ConstantOrTexture(std::clamp(properties.number("weight", 0.5), 0.0, 1.0));
-  return std::make_shared<Blend>(read_nested(properties, 2, texture ? 1 : 0, 0), weight);
+  const ConstantOrTexture weight = read_unit_number(properties, "weight");
+  if (!weight.texture && !properties.has("weight")) properties.fail("needs a weight");
+  return std::make_shared<Blend>(read_nested(properties, 2, weight.texture ? 1 : 0, 0), weight);
 }
 
 }  // namespace limn

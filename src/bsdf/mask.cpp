@@ -95,17 +95,10 @@ class Mask final : public NestingBsdf {
   BsdfNumber opacity_;
 };
 
-// A texture or a number in [0, 1].
-ConstantOrTexture read_opacity(Properties& properties) {
-  if (auto texture = read_texture(properties, "opacity", 1)) return texture;
-  const double opacity = properties.number("opacity", 0.5);
-  return std::clamp(opacity, 0.0, 1.0);
-}
-
 }  // namespace
 
 std::shared_ptr<Bsdf> read_mask(Properties& properties) {
-  const ConstantOrTexture opacity = read_opacity(properties);
+  const ConstantOrTexture opacity = read_unit_number(properties, "opacity");
   return std::make_shared<Mask>(read_nested(properties, 1, opacity.texture ? 1 : 0, 1), opacity);
 }
 

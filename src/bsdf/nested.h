@@ -84,6 +84,9 @@ class NestingBsdf : public SidedBsdf {
 std::vector<std::shared_ptr<Bsdf>> read_nested(Properties& properties, size_t count, int own,
                                                int rays);
 
+// A number (0.5), clamped to [0, 1], or a texture of such.
+ConstantOrTexture read_unit_number(Properties& properties, const char* name);
+
 // A number in [0, 1]: where it is less or more the end of that range, which has no slope.
 template <class S>
 S within_unit(const S& x) {

@@ -10,46 +10,17 @@
 
 #include "src/bsdf/fresnel.h"
 #include "src/bsdf/indices.h"
-#include "src/bsdf/microfacet.h"
+#include "src/bsdf/microfacet_reflection.h"
 #include "src/bsdf/sides.h"
 #include "src/bsdf/types.h"
 
 namespace limn {
 namespace {
 
-using Distribution = RoughConductorValues::Distribution;
-
-constexpr double kMinimumAlpha = 1e-4;  // as in Mitsuba
-constexpr double kMaximumAlpha = 1e6;
-
-template <class S>
-struct Facets {
-  Distribution distribution;
-  S alpha;
-
-  bool is_ggx() const { return distribution == Distribution::kGgx; }
-  // D(h) for h along m, over |m|^4. cos_m: n.m.
-  S density(const Vec3<S>& n, const Vec3<S>& m, const S& cos_m) const {
-    const S cos2 = cos_m * cos_m, sin2 = length_squared(cross(n, m));
-    return is_ggx() ? microfacet::ggx_d(cos2, sin2, alpha)
-                    : microfacet::beckmann_d(cos2, sin2, alpha);
-  }
-  // G1 / cos_v.
-  S masking_over_cos(const S& cos_v) const {
-    return is_ggx() ? microfacet::ggx_g1_over_cos(cos_v, alpha)
-                    : microfacet::beckmann_g1_over_cos(cos_v, alpha);
-  }
-  // The normalisation of the density of visible normals.
-  double exact_masking_over_cos(double cos_v) const {
-    return is_ggx() ? microfacet::ggx_g1_over_cos(cos_v, alpha)
-                    : microfacet::beckmann_exact_g1_over_cos(
-                          cos_v, alpha * std::sqrt(std::max(0.0, 1 - cos_v * cos_v)));
-  }
-  Vec3d visible(const Vec3d& v, double u1, double u2) const {
-    return is_ggx() ? microfacet::ggx_visible(v, alpha, alpha, u1, u2)
-                    : microfacet::beckmann_visible(v, alpha, alpha, u1, u2);
-  }
-};
+using microfacet::Distribution;
+using microfacet::Facets;
+using microfacet::kMaximumAlpha;
+using microfacet::kMinimumAlpha;
 
 // What value and density have in common: of reflection if wo lies above the surface, else of
 // refraction.
@@ -167,8 +138,8 @@ Rgb<S> RoughDielectric::evaluate(bool front, const Vec3<S>& n, const Vec3<S>& wi
   if (!facet.possible) return {};
   const S f = fresnel_dielectric(facet.cos_h, eta).reflected;
   const S cos_o = facet.above ? facet.cos_o : -facet.cos_o;
-  const S common =
-      facet.d * facets.masking_over_cos(facet.cos_i) * facets.masking_over_cos(cos_o) * cos_o;
+  const S common = facet.d * facets.masking_over_cos(wi, facet.cos_i) *
+                   facets.masking_over_cos(wo, cos_o) * cos_o;
   return facet.above ? specular_reflectance_.of(at) * (common * f)
                      : specular_transmittance_.of(at) * (common * (1.0 - f));
 }
@@ -187,7 +158,7 @@ double RoughDielectric::pdf_from(bool front, const Vec3d& n, const Vec3d& wi, co
   const Facet<double> facet(facets, n, wi, wo, eta);
   if (!facet.possible) return 0;
   const FacetSide side = facet_side(front, facet.cos_h, at);
-  return facet.d * facets.exact_masking_over_cos(facet.cos_i) *
+  return facet.d * facets.exact_masking_over_cos(wi, facet.cos_i) *
          (facet.above ? side.reflecting() : side.passing() * (eta * eta));
 }
 
