@@ -64,7 +64,7 @@ std::vector<std::shared_ptr<Bsdf>> read_nested(Properties& properties, size_t co
 
 ConstantOrTexture read_unit_number(Properties& properties, const char* name) {
   if (auto texture = read_texture(properties, name, 1)) return texture;
-  return std::clamp(properties.number(name, 0.5), 0.0, 1.0);
+  return std::clamp(properties.number_or_colour(name, 0.5), 0.0, 1.0);
 }
 
 }  // namespace limn

@@ -52,7 +52,7 @@ double bound_of_base(double color, double roughness, double sheen, double sheen_
 ConstantOrTexture read_number(Properties& properties, const char* name, double absent,
                               double most) {
   if (auto texture = read_texture(properties, name, most)) return texture;
-  const double number = properties.number(name, absent);
+  const double number = properties.number_or_colour(name, absent);
   if (!(number >= 0 && number <= most)) {
     properties.fail(name, fmt::format("must lie in [0, {:g}]", most));
   }

@@ -13,7 +13,7 @@ namespace {
 
 ConstantOrTexture read_alpha(Properties& properties, const char* name) {
   if (auto texture = properties.texture(name)) return texture;
-  const double alpha = properties.number(name, 0.1);
+  const double alpha = properties.number_or_colour(name, 0.1);
   if (!(alpha >= 0)) properties.fail(name, "the roughness must not be negative");
   if (!(alpha < kMaximumAlpha)) {
     properties.fail(name, fmt::format("the roughness must be less than {:g}", kMaximumAlpha));

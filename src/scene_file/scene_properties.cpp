@@ -64,7 +64,7 @@ double DescribedProperties::number(const std::string& name, double absent) {
   const DescribedProperty* p = find(name);
   if (!p) {
     const ObjectDescription* object = find_object(name);
-    return object ? luminance(rgb_of(*object, name, ColourUse::kReflectance)) : absent;
+    return object ? number_of(rgb_of(*object, name, ColourUse::kReflectance)) : absent;
   }
   if (const double* v = std::get_if<double>(&p->value)) return *v;
   if (const int64_t* v = std::get_if<int64_t>(&p->value)) return static_cast<double>(*v);

@@ -22,7 +22,7 @@ class Checkerboard final : public Texture {
     const auto copy = std::make_shared<Checkerboard>(*this);
     copy->of_numbers_ = true;
     for (int i = 0; i < 2; ++i) {
-      const double y = luminance(value(colors_[1 - i]));
+      const double y = number_of(value(colors_[1 - i]));
       copy->colors_[i] = {y, y, y};
     }
     return copy;

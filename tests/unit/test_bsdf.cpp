@@ -512,6 +512,17 @@ TEST(Bsdf, DefaultsAreMitsubas) {
             0.3);
 }
 
+TEST(Bsdf, NumbersTakeTheMeanOfColours) {
+  const Rgb<double> colour{0.9, 0.3, 0.15};
+  EXPECT_DOUBLE_EQ(read("roughconductor", {{"alpha", colour}})->lobe().alpha, 0.45);
+  EXPECT_NE(read("principled", {{"metallic", colour}})->describe().find("0.45"), std::string::npos);
+  TestProperties mask("bsdf", "mask", {{"opacity", colour}}, {make_diffuse(grey(0.5))});
+  EXPECT_DOUBLE_EQ(make_bsdf(mask)->lobe().albedo, 0.45 * 0.5);
+  TestProperties board("texture", "checkerboard", {{"color0", colour}, {"color1", 0.45}});
+  const auto numbers = make_texture(board)->for_numbers();
+  EXPECT_DOUBLE_EQ(numbers->range().least, numbers->range().most);
+}
+
 TEST(NormalMap, OfAConstantIsThatOfATexture) {
   const Rgb<double> t{0.6, 0.45, 0.95}, tangent{0.9, -1.3, 0.4}, outward{0.1, 0.2, 0.7};
   const auto make = [&](bool constant) {

@@ -18,6 +18,10 @@ namespace limn {
 class Bsdf;
 class Texture;
 
+// What a constant colour stands for where a number is asked for: its mean, as in Mitsuba (of a
+// bitmap it is the luminance).
+inline double number_of(const Rgb<double>& c) { return (c.r + c.g + c.b) / 3; }
+
 class Properties {
  public:
   virtual ~Properties() = default;
@@ -51,6 +55,11 @@ class Properties {
   virtual std::shared_ptr<Texture> only_texture() = 0;
   // Nested bsdf elements and references to bsdfs, in order.
   virtual std::vector<std::shared_ptr<Bsdf>> bsdfs() = 0;
+
+  // A number where a texture may stand: a number, or a colour, of which number_of.
+  double number_or_colour(const std::string& name, double absent) {
+    return number_of(rgb(name, grey(absent)));
+  }
 
   // The roughness that smooth lobes are asked to have; 0: they are smooth.
   virtual double smooth_as() const { return 0; }

@@ -35,8 +35,8 @@ class Texture : public TexelMap {
   virtual Rgb<double> eval(const TexturePoint<double>& point) const = 0;
   virtual Rgb<Dual> eval(const TexturePoint<Dual>& point) const = 0;
 
-  // The same texture where one number is asked for (a roughness, a weight): colours give their
-  // luminance. It shares no mutable data with this one.
+  // The same texture where one number is asked for (a roughness, a weight): texels give their
+  // luminance, other colours number_of. It shares no mutable data with this one.
   virtual std::shared_ptr<Texture> for_numbers() const = 0;
   bool of_numbers() const { return of_numbers_; }
 
