@@ -14,8 +14,8 @@
 
 namespace limn {
 
-// Border: derives from this and has kName and split(front, n, wi, rays, at), which is smooth_rays of
-// that side and writes two.
+// Border: derives from this and has kName and split(front, n, wi, rays, at), which is smooth_rays
+// of that side and writes two.
 template <class Border>
 class SmoothBorder : public SidedBsdf {
  public:
