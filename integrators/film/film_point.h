@@ -15,9 +15,9 @@ struct FilmPoint {
   double distance;      // along it
 };
 
-// Where a point of a face is on the film, as seen through this point of a lens, if nothing hides it.
-// None where no pixel can use it: outside the film and the filter around it, before or behind the
-// clip planes, on an emitter that the camera does not see.
+// Where a point of a face is on the film, as seen through this point of a lens, if nothing hides
+// it. None where no pixel can use it: outside the film and the filter around it, before or behind
+// the clip planes, on an emitter that the camera does not see.
 std::optional<FilmPoint> film_point(const Scene& scene, FaceRef face, const Vec3d& x,
                                     const LensPoint& lens);
 // The same seen at x, a point nearby.

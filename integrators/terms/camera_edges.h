@@ -1,6 +1,6 @@
 #pragma once
-// Edges on the film that are listed once: seen from a pinhole, also by way of flat mirrors, or along
-// the direction of an orthographic camera.
+// Edges on the film that are listed once: seen from a pinhole, also by way of flat mirrors, or
+// along the direction of an orthographic camera.
 #include "integrators/film/film_regions.h"
 #include "integrators/terms/film_edges.h"
 #include "limn/core/discrete_distribution.h"

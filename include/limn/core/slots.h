@@ -34,7 +34,7 @@ struct SeededCopy {
 template <class T>
 using SeededCopies = std::vector<SeededCopy<T>>;
 
-// The camera's values: origin, left, up, forward (three each), fov, aperture_radius, focus_distance.
+// The camera's origin, left, up, forward (three each), fov, aperture_radius, focus_distance.
 inline constexpr uint32_t kCameraSlots = 15;
 
 struct SceneSlots {
