@@ -15,8 +15,8 @@ struct MirrorSight {
   FaceRef last() const { return by.faces[by.count - 1]; }
 };
 
-// The ray from a viewer that is seen from its image in the chain as that from `image` through y:
-// its origin and unit direction.
+// The ray from the viewer that, reflected by the chain, becomes the straight ray from `image`
+// through y. Its direction is unit.
 Ray unfolded(const FlatMirrors& mirrors, const FlatMirrors::Chain& chain, const Vec3d& image,
              const Vec3d& y);
 

@@ -24,9 +24,9 @@ class Motions:
     """What is given for the parameters of a scene: values, and steps of motions without a value.
 
     A shape is scaled by 1 + s about the center c of its bounds, turned about an axis through c, then
-    translated by t: p = c + t + (1 + s) R (p0 - c). At the scene that came out, limn's own rotation
-    and scale are about the center c' of the new bounds. Those about c + t differ by translations:
-    e x (p - c - t) = e x (p - c') + e x (c' - c - t), and likewise of scales.
+    translated by t: p = c + t + (1 + s) R (p0 - c). In the moved scene limn's
+    own rotation and scale are about c', the center of its bounds. Those about c + t differ by
+    translations: e x (p - c - t) = e x (p - c') + e x (c' - c - t), and likewise of scales.
     """
 
     def __init__(self, scene: Scene, numbers: Mapping[str, Any]) -> None:
