@@ -1,6 +1,6 @@
 #pragma once
-// Light that reaches the camera by way of smooth lobes. The edges that it shows are in no term of a
-// derivative: it lacks them where they move.
+// Light that reaches the camera by way of smooth lobes, but for flat mirrors whose edges are listed
+// (flat_mirrors.h). The edges that it shows are in no term of a derivative.
 #include <span>
 #include <string>
 #include <vector>
