@@ -2,6 +2,7 @@
 #include "src/scene_file/scene_description.h"
 
 #include <algorithm>
+#include <set>
 
 #include "limn/core/names.h"
 
@@ -22,6 +23,8 @@ bool contains(const std::vector<std::string>& words, const std::string& word) {
 
 class Describer {
  public:
+  explicit Describer(ErrorList& errors) : errors_(errors) {}
+
   SceneDescription describe(const SceneTree& tree, const std::string& file) {
     const XmlElement& root = tree.root;
     if (root.name != "scene") {
@@ -32,14 +35,35 @@ class Describer {
     scene_.search_path = tree.search_path;
     scene_.files = tree.files;
     scene_.warnings = tree.warnings;
-    for (const XmlElement& child : root.children) add_to_scene(child);
+    for (const XmlElement& child : root.children) {
+      read(child, [&] { add_to_scene(child); });
+    }
     for (const auto& object : all_objects_) resolve(*object);
-    for (const XmlAttribute& id : root_references_) add_reference(find(id.value, id.where));
-    for (const auto& [name, id] : aliases_) find(id.value, id.where);
+    for (const XmlAttribute& id : root_references_) {
+      errors_.keep([&] { add_reference(find(id.value, id.where)); });
+    }
+    for (const auto& [name, id] : aliases_) errors_.keep([&] { find(id.value, id.where); });
     return std::move(scene_);
   }
 
  private:
+  // Runs a step that reads `element`. If it fails, references to what is inside report nothing.
+  template <class Step>
+  bool read(const XmlElement& element, const Step& step) {
+    const bool is_read = errors_.keep([&] {
+      if (element.failed) throw InputErrors();
+      step();
+    });
+    if (!is_read) forgive_references(element);
+    return is_read;
+  }
+
+  void forgive_references(const XmlElement& element) {
+    const XmlAttribute* id = element.find(element.name == "alias" ? "as" : "id");
+    if (id && element.name != "ref") reported_ids_.insert(id->value);
+    for (const XmlElement& child : element.children) forgive_references(child);
+  }
+
   void add_to_scene(const XmlElement& element) {
     if (element.name == "alias") {
       add_alias(element);
@@ -87,7 +111,9 @@ class Describer {
       object->id = id->value;
     }
     all_objects_.push_back(object);
-    for (const XmlElement& child : element.children) add_to_object(child, *object);
+    for (const XmlElement& child : element.children) {
+      if (!read(child, [&] { add_to_object(child, *object); })) object->failed = true;
+    }
     return object;
   }
 
@@ -160,12 +186,19 @@ class Describer {
   }
 
   // An alias may name a later alias.
-  std::shared_ptr<ObjectDescription> find(std::string id, SourceLocation where) const {
-    for (size_t step = 0;; ++step) {
-      if (step > aliases_.size()) throw InputError(where, "the alias \"" + id + "\" names itself");
-      if (step > kMaxAliases) throw InputError(where, "aliases of aliases, more than 64 deep");
+  std::shared_ptr<ObjectDescription> find(std::string id, SourceLocation where) {
+    std::vector<std::string> followed;
+    const auto fail = [&](const std::string& message) {
+      reported_ids_.insert(followed.begin(), followed.end());
+      throw InputError(where, message);
+    };
+    while (true) {
+      if (followed.size() > aliases_.size()) fail("the alias \"" + id + "\" names itself");
+      if (followed.size() > kMaxAliases) fail("aliases of aliases, more than 64 deep");
       const auto found = by_id_.find(id);
       if (found != by_id_.end()) return found->second;
+      if (reported_ids_.count(id)) throw InputErrors();
+      followed.push_back(id);
       const auto alias = aliases_.find(id);
       if (alias == aliases_.end()) break;
       id = alias->second.value;
@@ -173,20 +206,26 @@ class Describer {
     }
     std::vector<std::string> known;
     for (const auto& [name, object] : by_id_) known.push_back(name);
-    throw InputError(where, "there is no object with the id \"" + id + "\" (" +
-                                known_names(known, "none has one") + ")");
+    fail("there is no object with the id \"" + id + "\" (" + known_names(known, "none has one") +
+         ")");
+    return nullptr;
   }
 
-  void resolve(ObjectDescription& object) const {
+  void resolve(ObjectDescription& object) {
     for (ChildDescription& child : object.children) {
-      if (!child.object) child.object = find(child.reference, child.where);
+      if (child.object) continue;
+      const auto look = [&] { child.object = find(child.reference, child.where); };
+      if (!errors_.keep(look)) object.failed = true;
     }
+    std::erase_if(object.children, [](const ChildDescription& child) { return !child.object; });
   }
 
+  ErrorList& errors_;
   SceneDescription scene_;
   std::vector<std::shared_ptr<ObjectDescription>> all_objects_;
   std::map<std::string, std::shared_ptr<ObjectDescription>> by_id_;
   std::map<std::string, SourceLocation> id_places_;
+  std::set<std::string> reported_ids_;  // that have no object, which is reported
   std::map<std::string, XmlAttribute> aliases_;
   std::vector<XmlAttribute> root_references_;
 };
@@ -194,8 +233,9 @@ class Describer {
 }  // namespace
 
 SceneDescription describe_scene(const std::string& file, const SceneInput& input,
-                                const std::string* text) {
-  SceneDescription description = Describer().describe(load_scene_tree(file, input, text), file);
+                                const std::string* text, ErrorList& errors) {
+  SceneDescription description =
+      Describer(errors).describe(load_scene_tree(file, input, text, errors), file);
   name_objects(description);
   return description;
 }

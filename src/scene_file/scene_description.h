@@ -33,6 +33,8 @@ struct ObjectDescription {
   SourceLocation where;
   std::map<std::string, DescribedProperty> properties;
   std::vector<ChildDescription> children;
+  // An error of this object, or of one that it needs, is reported: it is not read further.
+  mutable bool failed = false;
 };
 
 struct SceneDescription {
@@ -52,10 +54,11 @@ struct SceneDescription {
   std::vector<std::string> files;  // the scene file and what it includes
 };
 
-// Parses a scene file and resolves all references. InputError for unknown elements, attributes and
-// references, and for duplicate ids and properties. text: see load_scene_tree().
+// Parses a scene file and resolves all references. Unknown elements, attributes and references,
+// and duplicate ids and properties, go to `errors`; InputError for what leaves no scene to describe.
+// Objects that failed are there without what failed. text: see load_scene_tree().
 SceneDescription describe_scene(const std::string& file, const SceneInput& input,
-                                const std::string* text);
+                                const std::string* text, ErrorList& errors);
 
 // Gives shapes and emitters without an id one, by which parameters find them: the name of the mesh
 // file or the type ("sphere", "sphere_1", ...). What stands inside of a shape gets the shape's id

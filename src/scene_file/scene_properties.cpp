@@ -20,6 +20,12 @@ ColourUse use_of(const std::string& tag, const std::string& name) {
   return name == "eta" || name == "k" ? ColourUse::kUnbounded : ColourUse::kReflectance;
 }
 
+// An object that is read on: one that did not fail.
+const ObjectDescription& sound(const ObjectDescription& object) {
+  if (object.failed) throw InputErrors();
+  return object;
+}
+
 std::vector<std::string> sorted(const std::set<std::string>& names) {
   return {names.begin(), names.end()};
 }
@@ -46,7 +52,7 @@ void DescribedProperties::fail_type(const std::string& name, const DescribedProp
 
 const ObjectDescription* DescribedProperties::find_object(const std::string& name) const {
   for (const ChildDescription& child : object_.children) {
-    if (child.name == name && is_value(*child.object)) return child.object.get();
+    if (child.name == name && is_value(*child.object)) return &sound(*child.object);
   }
   return nullptr;
 }
@@ -174,9 +180,15 @@ std::shared_ptr<Texture> DescribedProperties::only_texture() {
 std::vector<std::shared_ptr<Bsdf>> DescribedProperties::bsdfs() {
   known_tags_.insert("bsdf");
   std::vector<std::shared_ptr<Bsdf>> made;
+  ErrorList errors;
+  bool all_made = true;
   for (const ChildDescription& child : object_.children) {
-    if (child.object->tag == "bsdf") made.push_back(make_nested_.bsdf(*child.object));
+    if (child.object->tag != "bsdf") continue;
+    const auto make = [&] { made.push_back(make_nested_.bsdf(*child.object)); };
+    all_made = errors.keep(make) && all_made;
   }
+  errors.throw_any();
+  if (!all_made) throw InputErrors();
   return made;
 }
 
@@ -191,43 +203,44 @@ const ObjectDescription* DescribedProperties::nested(const std::string& wanted) 
     }
     found = child.object.get();
   }
-  return found;
+  return found ? &sound(*found) : nullptr;
 }
 
 std::vector<const ObjectDescription*> DescribedProperties::all_nested(const std::string& wanted) {
   known_tags_.insert(wanted);
   std::vector<const ObjectDescription*> found;
   for (const ChildDescription& child : object_.children) {
-    if (child.object->tag == wanted) found.push_back(child.object.get());
+    if (child.object->tag == wanted) found.push_back(&sound(*child.object));
   }
   return found;
 }
 
 void DescribedProperties::check_all_used() const {
-  // Visited in file order, so that the first mistake is reported.
-  const DescribedProperty* first = nullptr;
-  std::string first_name;
-  const auto place = [](const SourceLocation& l) { return std::make_pair(l.line, l.column); };
+  // Visited in file order, properties first.
+  std::vector<std::pair<SourceLocation, std::string>> unused;
   for (const auto& [name, property] : object_.properties) {
     if (known_.count(name)) continue;
-    if (first && place(first->where) < place(property.where)) continue;
-    first = &property;
-    first_name = name;
+    unused.emplace_back(property.where, unknown_name("parameter", name, sorted(known_)));
   }
-  if (first) {
-    throw InputError(first->where, tag() + " \"" + type() + "\": " +
-                                       unknown_name("parameter", first_name, sorted(known_)));
-  }
+  const auto place = [](const auto& u) { return std::pair(u.first.line, u.first.column); };
+  std::sort(unused.begin(), unused.end(),
+            [&](const auto& a, const auto& b) { return place(a) < place(b); });
   for (const ChildDescription& child : object_.children) {
     if (known_tags_.count(child.object->tag)) continue;
     if (is_value(*child.object) && known_.count(child.name)) continue;
-    if (is_value(*child.object) && !child.name.empty()) {
-      throw InputError(child.where, tag() + " \"" + type() + "\": " +
-                                        unknown_name("parameter", child.name, sorted(known_)));
-    }
-    throw InputError(child.where, tag() + " \"" + type() + "\": takes no " + child.object->tag +
-                                      " (" + known_names(sorted(known_tags_)) + ")");
+    const bool is_named = is_value(*child.object) && !child.name.empty();
+    unused.emplace_back(child.where, is_named
+                                         ? unknown_name("parameter", child.name, sorted(known_))
+                                         : "takes no " + child.object->tag + " (" +
+                                               known_names(sorted(known_tags_)) + ")");
   }
+  ErrorList errors;
+  for (const auto& [where, problem] : unused) {
+    errors.keep([&, &where = where, &problem = problem] {
+      throw InputError(where, tag() + " \"" + type() + "\": " + problem);
+    });
+  }
+  errors.throw_any();
 }
 
 }  // namespace limn

@@ -4,6 +4,7 @@
 #include <set>
 
 #include "limn/core/properties.h"
+#include "src/scene_file/error_list.h"
 #include "src/scene_file/scene_description.h"
 #include "src/scene_file/spectrum.h"
 
@@ -44,15 +45,16 @@ class DescribedProperties final : public Properties {
   std::vector<std::shared_ptr<Bsdf>> bsdfs() override;
   double smooth_as() const override { return make_nested_.smooth_as; }
 
-  // The nested object of this tag; null if there is none, InputError if there are several.
+  // The nested object of this tag; null if there is none, InputError if there are several or if it
+  // failed.
   const ObjectDescription* nested(const std::string& tag);
 
-  // All nested objects of this tag, in order.
+  // All nested objects of this tag, in order. InputError if one failed.
   std::vector<const ObjectDescription*> all_nested(const std::string& tag);
   // One number as three, a colour or a vector, as it stands in the file.
   Rgb<double> triple(const std::string& name);
 
-  // InputError for the first property or nested object that was never read.
+  // InputErrors for all properties and nested objects that were never read, in the file's order.
   void check_all_used() const;
 
  private:

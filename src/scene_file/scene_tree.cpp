@@ -46,8 +46,10 @@ std::string find_input(const std::string& name, const std::string& mentioned_in,
 
 class TreeLoader {
  public:
-  explicit TreeLoader(const SceneInput& input)
-      : defines_(input.defines), values_(input.defines.begin(), input.defines.end()) {
+  TreeLoader(const SceneInput& input, ErrorList& errors)
+      : errors_(errors),
+        defines_(input.defines),
+        values_(input.defines.begin(), input.defines.end()) {
     tree_.search_path = input.paths;
   }
 
@@ -56,6 +58,7 @@ class TreeLoader {
     tree_.root = text ? parse_xml(file, *text) : parse_file(file, {file});
     upgrade(tree_.root, tree_.warnings);
     expand(tree_.root, 0, true);
+    if (is_incomplete_) throw InputErrors();
     check_defines(file);
     return std::move(tree_);
   }
@@ -98,21 +101,31 @@ class TreeLoader {
     }
     size_t end = begin;
     while (end < text.size() && is_word(text[end])) ++end;
+    if (is_incomplete_) throw InputErrors();  // what is missing may define it
     throw InputError(where, "undefined parameter \"$" + text.substr(begin, end - begin) + "\" (" +
                                 known_parameters(values_) + ")");
   }
 
   void expand(XmlElement& element, int include_depth, bool is_root) {
-    for (XmlAttribute& attribute : element.attributes) attribute.value = substitute(attribute);
+    for (XmlAttribute& attribute : element.attributes) {
+      const bool is_read = errors_.keep([&] { attribute.value = substitute(attribute); });
+      element.failed = element.failed || !is_read;
+    }
     std::vector<XmlElement> children = std::move(element.children);
     element.children.clear();
     for (XmlElement& child : children) {
       if (child.name == "default" || child.name == "path" || child.name == "include") {
-        if (!is_root) {
-          throw InputError(child.where, "<" + child.name + "> belongs directly under <scene>");
-        }
-        expand(child, include_depth, false);
-        obey(child, element, include_depth);
+        const bool is_obeyed = errors_.keep([&] {
+          if (!is_root) {
+            throw InputError(child.where, "<" + child.name + "> belongs directly under <scene>");
+          }
+          expand(child, include_depth, false);
+          if (child.failed) throw InputErrors();
+          obey(child, element, include_depth);
+        });
+        if (is_obeyed) continue;
+        is_incomplete_ = true;
+        lacks_path_ = lacks_path_ || child.name == "path";
       } else {
         expand(child, include_depth, false);
         element.children.push_back(std::move(child));
@@ -151,6 +164,7 @@ class TreeLoader {
     check_attributes(order, {"filename"}, {"filename"});
     const XmlAttribute& name = *order.find("filename");
     const std::string file = find_input_file(name.value, name.where.file, tree_.search_path);
+    if (file.empty() && lacks_path_) throw InputErrors();  // it may be there
     if (file.empty()) throw InputError(name.where, "no such file: \"" + name.value + "\"");
     if (depth >= kMaxIncludeDepth) {
       throw InputError(name.where, "files are included more than 15 deep");
@@ -182,22 +196,27 @@ class TreeLoader {
     return parse_xml(file, *text);
   }
 
-  void check_defines(const std::string& file) const {
+  void check_defines(const std::string& file) {
+    auto known = values_;
+    for (const auto& [name, value] : defines_) {
+      if (!used_.count(name)) known.erase(name);
+    }
     for (const auto& [name, value] : defines_) {
       if (used_.count(name)) continue;
-      auto known = values_;
-      for (const auto& [other, unused] : defines_) {
-        if (!used_.count(other)) known.erase(other);
-      }
-      throw InputError({file}, "-D " + name + "=" + value + ": the scene has no parameter \"$" +
-                                   name + "\" (" + known_parameters(known) + ")");
+      errors_.keep([&, &name = name, &value = value] {
+        throw InputError({file}, "-D " + name + "=" + value + ": the scene has no parameter \"$" +
+                                     name + "\" (" + known_parameters(known) + ")");
+      });
     }
   }
 
+  ErrorList& errors_;
   const std::map<std::string, std::string>& defines_;
   std::map<std::string, std::string, std::less<>> values_;
   std::set<std::string> used_;
   size_t text_ = 0, substituted_ = 0, path_elements_ = 0;
+  bool is_incomplete_ = false;  // a <default>, <include> or <path> failed
+  bool lacks_path_ = false;     // a <path> did
   SceneTree tree_;
 };
 
@@ -226,9 +245,9 @@ std::string find_input_file(const std::string& name, const std::string& mentione
   });
 }
 
-SceneTree load_scene_tree(const std::string& file, const SceneInput& input,
-                          const std::string* text) {
-  return TreeLoader(input).load(file, text);
+SceneTree load_scene_tree(const std::string& file, const SceneInput& input, const std::string* text,
+                          ErrorList& errors) {
+  return TreeLoader(input, errors).load(file, text);
 }
 
 }  // namespace limn

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "src/scene_file/error_list.h"
 #include "src/scene_file/xml_tree.h"
 
 namespace limn {
@@ -25,9 +26,10 @@ struct SceneInput {
 
 // Defines override <default>; unused ones are errors. An included file has the root <scene>,
 // whose content replaces the include, or any other element. text: the content of `file`, which then
-// need not exist; null: reads the file.
-SceneTree load_scene_tree(const std::string& file, const SceneInput& input,
-                          const std::string* text);
+// need not exist; null: reads the file. Errors after which the rest has a meaning go to `errors`,
+// others are thrown.
+SceneTree load_scene_tree(const std::string& file, const SceneInput& input, const std::string* text,
+                          ErrorList& errors);
 
 // The first existing file of: `name` if absolute; in the directory of the referring file; in the
 // search path. "" if none exists.

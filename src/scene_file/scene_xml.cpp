@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <optional>
 #include <stdexcept>
 
 #include "limn/core/face_overlaps.h"
@@ -23,9 +24,10 @@ namespace {
 
 class SceneBuilder {
  public:
-  SceneBuilder(const SceneDescription& description, std::vector<std::string>* warnings,
-               double smooth_as = 0)
+  SceneBuilder(const SceneDescription& description, ErrorList& errors,
+               std::vector<std::string>* warnings, double smooth_as)
       : description_(description),
+        errors_(errors),
         warnings_(warnings ? *warnings : unread_warnings_),
         make_nested_{[this](const ObjectDescription& object) { return bsdf(object); },
                      [this](const ObjectDescription& object) { return texture(object); },
@@ -37,13 +39,20 @@ class SceneBuilder {
     scene_.smooth_as = make_nested_.smooth_as;
     warnings_.insert(warnings_.end(), description_.warnings.begin(), description_.warnings.end());
     for (const auto& object : description_.objects) {
-      add(*object);
-      note_data_file(*object);
+      if (object->failed) make_bsdfs_in(*object);
+      instance_ = {};
+      errors_.keep([&] {
+        read_once(*object, [&] {
+          add(*object);
+          note_data_file(*object);
+        });
+      });
     }
     // Unused BSDFs are built, too, since they may contain errors and their ids count.
     for (const auto& object : description_.objects) {
-      if (object->tag == "bsdf") bsdf(*object);
+      if (object->tag == "bsdf") errors_.keep([&] { bsdf(*object); });
     }
+    errors_.throw_any();
     if (scene_.sensors.empty()) {
       throw InputError(description_.where, "<scene>: there is no sensor");
     }
@@ -53,6 +62,25 @@ class SceneBuilder {
   }
 
  private:
+  // Runs a step that reads `object`. One that failed is neither read again nor reported again.
+  template <class Step>
+  static void read_once(const ObjectDescription& object, const Step& step) {
+    if (object.failed) throw InputErrors();
+    try {
+      step();
+    } catch (const InputError&) {
+      object.failed = true;
+      throw;
+    }
+  }
+
+  // For their errors: of an object that failed before it was built.
+  void make_bsdfs_in(const ObjectDescription& object) {
+    for (const ChildDescription& child : object.children) {
+      if (child.object->tag == "bsdf") errors_.keep([&] { bsdf(*child.object); });
+    }
+  }
+
   void add(const ObjectDescription& object) {
     if (object.tag == "integrator") {
       only_one(object, "integrator", integrator_);
@@ -113,6 +141,7 @@ class SceneBuilder {
 
   // One object per element, shared by all references to it.
   std::shared_ptr<Bsdf> bsdf(const ObjectDescription& object) {
+    if (object.failed) throw InputErrors();
     const auto [entry, is_new] = bsdfs_.try_emplace(&object);
     if (!is_new) {
       if (!entry->second) throw InputError(object.where, "the bsdf contains itself");
@@ -120,9 +149,22 @@ class SceneBuilder {
     }
     constexpr int kMaxDepth = 64;  // not tuned: far below what the stack takes
     if (bsdf_depth_ == kMaxDepth) {
+      object.failed = true;
       throw InputError(object.where, "bsdfs are nested more than 64 deep");
     }
     ++bsdf_depth_;
+    try {
+      bsdfs_[&object] = make_bsdf_of(object);
+    } catch (const InputError&) {
+      object.failed = true;
+      --bsdf_depth_;
+      throw;
+    }
+    --bsdf_depth_;
+    return bsdfs_[&object];
+  }
+
+  std::shared_ptr<Bsdf> make_bsdf_of(const ObjectDescription& object) {
     DescribedProperties p(object, description_, make_nested_);
     std::shared_ptr<Bsdf> made = make_bsdf(p);
     p.check_all_used();
@@ -130,9 +172,7 @@ class SceneBuilder {
       warnings_.push_back(format_warning(
           object.where, "bumpmap: derivatives of what moves take its normals as constants"));
     }
-    --bsdf_depth_;
     if (!object.id.empty()) scene_.bsdfs_by_id[object.id] = made;
-    bsdfs_[&object] = made;
     return made;
   }
 
@@ -140,10 +180,13 @@ class SceneBuilder {
   std::shared_ptr<Texture> texture(const ObjectDescription& object) {
     std::shared_ptr<Texture>& made = textures_[&object];
     if (!made) {
-      note_data_file(object);
-      DescribedProperties p(object, description_, make_nested_);
-      made = make_texture(p);
-      p.check_all_used();
+      read_once(object, [&] {
+        note_data_file(object);
+        DescribedProperties p(object, description_, make_nested_);
+        std::shared_ptr<Texture> read = make_texture(p);
+        p.check_all_used();
+        made = read;
+      });
     }
     return made->clone();
   }
@@ -163,9 +206,11 @@ class SceneBuilder {
   }
 
   void read_nested_light(const ObjectDescription& object, Shape& shape) {
-    DescribedProperties p(object, description_, make_nested_);
-    read_light(p, scene_, &shape);
-    p.check_all_used();
+    read_once(object, [&] {
+      DescribedProperties p(object, description_, make_nested_);
+      read_light(p, scene_, &shape);
+      p.check_all_used();
+    });
   }
 
   MeshOptions read_mesh_options(DescribedProperties& p, bool from_file) {
@@ -289,7 +334,7 @@ class SceneBuilder {
     instance_ = to_world;
     for (const ObjectDescription* shape : check_group(*groups[0])) {
       const std::string suffix = number == 1 ? "" : "." + std::to_string(number);
-      add_shape(*shape, shape->id + suffix);
+      read_once(*shape, [&] { add_shape(*shape, shape->id + suffix); });
       if (scene_.shapes.back().is_emitter) p.fail("a shapegroup with an emitter");
       instanced_faces_ += scene_.shapes.back().mesh.faces.size();
       if (instanced_faces_ > kMostInstancedFaces) {
@@ -392,12 +437,20 @@ class SceneBuilder {
     shape.id = id;
     shape.where = object.where;
     MeshOptions options;
-    RawMesh raw = read_geometry(p, options);
+    RawMesh raw;
+    std::vector<std::shared_ptr<Bsdf>> bsdfs;
+    const bool has_mesh = errors_.keep([&] { raw = read_geometry(p, options); });
+    bool is_sound = errors_.keep([&] {
+      bsdfs = p.bsdfs();
+      if (bsdfs.size() > 1) p.fail("has " + std::to_string(bsdfs.size()) + " bsdfs (one at most)");
+    });
+    is_sound &= errors_.keep([&] {
+      const ObjectDescription* emitter = p.nested("emitter");
+      if (emitter) read_nested_light(*emitter, shape);
+    });
+    is_sound &= has_mesh && errors_.keep([&] { p.check_all_used(); });
+    if (!is_sound) throw InputErrors();
     if (raw.where.file.empty()) raw.where = object.where;
-    const std::vector<std::shared_ptr<Bsdf>> bsdfs = p.bsdfs();
-    if (bsdfs.size() > 1) p.fail("has " + std::to_string(bsdfs.size()) + " bsdfs (one at most)");
-    if (const ObjectDescription* emitter = p.nested("emitter")) read_nested_light(*emitter, shape);
-    p.check_all_used();
     check_memory(raw);
     const double grey_value = shape.is_emitter ? 0.0 : 0.5;
     shape.bsdf = bsdfs.empty() ? make_diffuse(grey(grey_value)) : bsdfs[0];
@@ -415,6 +468,7 @@ class SceneBuilder {
   }
 
   const SceneDescription& description_;
+  ErrorList& errors_;
   std::vector<std::string> unread_warnings_;
   std::vector<std::string>& warnings_;
   Makers make_nested_;
@@ -431,25 +485,41 @@ class SceneBuilder {
   const ObjectDescription* environment_ = nullptr;
 };
 
+// text: see load_scene_tree(). All errors that are independent are thrown as one.
+Scene read(const std::string& file, const SceneInput& input, const std::string* text,
+           std::vector<std::string>* warnings, double smooth_as) {
+  ErrorList errors;
+  std::optional<Scene> scene;
+  errors.keep([&] {
+    const SceneDescription description = describe_scene(file, input, text, errors);
+    scene = SceneBuilder(description, errors, warnings, smooth_as).build();
+  });
+  errors.throw_any();
+  return std::move(*scene);
+}
+
 }  // namespace
 
 Scene read_scene(const std::string& file, const std::map<std::string, std::string>& defines,
                  std::vector<std::string>* warnings, const std::vector<std::string>& paths,
                  double smooth_as) {
-  const SceneDescription description = describe_scene(file, {defines, paths}, nullptr);
-  return SceneBuilder(description, warnings, smooth_as).build();
+  return read(file, {defines, paths}, nullptr, warnings, smooth_as);
 }
 
 size_t count_sensors(const std::string& file, const std::map<std::string, std::string>& defines,
                      const std::vector<std::string>& paths) {
   size_t count = 0;
-  for (const auto& object : describe_scene(file, {defines, paths}, nullptr).objects) {
-    if (object->tag != "sensor") continue;
-    if (object->type != "batch") ++count;
-    for (const ChildDescription& child : object->children) {
-      count += child.object->tag == "sensor" ? 1 : 0;
+  ErrorList errors;
+  errors.keep([&] {
+    for (const auto& object : describe_scene(file, {defines, paths}, nullptr, errors).objects) {
+      if (object->tag != "sensor") continue;
+      if (object->type != "batch") ++count;
+      for (const ChildDescription& child : object->children) {
+        count += child.object->tag == "sensor" ? 1 : 0;
+      }
     }
-  }
+  });
+  errors.throw_any();
   return count;
 }
 
@@ -457,8 +527,7 @@ Scene read_scene_text(const std::string& text, const std::string& folder,
                       const std::map<std::string, std::string>& defines,
                       std::vector<std::string>* warnings) {
   const std::string file = (std::filesystem::path(folder) / "string").string();
-  const SceneDescription description = describe_scene(file, {defines, {}}, &text);
-  return SceneBuilder(description, warnings).build();
+  return read(file, {defines, {}}, &text, warnings, 0);
 }
 
 }  // namespace limn

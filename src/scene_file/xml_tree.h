@@ -18,6 +18,7 @@ struct XmlElement {
   SourceLocation where;  // of its "<"
   std::vector<XmlAttribute> attributes;
   std::vector<XmlElement> children;
+  bool failed = false;  // an error in its attributes is reported: their values mean nothing
 
   // Null if absent.
   const XmlAttribute* find(const std::string& attribute) const;

@@ -1,6 +1,8 @@
 // The exact message of every kind of mistake in a scene file.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "limn/core/memory.h"
 #include "limn/core/scene.h"
 #include "support/temp_files.h"
@@ -119,6 +121,86 @@ TEST(BadScene, FilmBeyondMemory) {
   }
   EXPECT_NO_THROW(require_memory(where, 1, "", ""));
   EXPECT_GT(free_memory(), 0);
+}
+
+// In the order of the readers' passes; lists of what is known are cut out.
+TEST(BadScene, IndependentMistakesAreReportedTogether) {
+  const TempFiles files;
+  const std::string content = scene(
+      "<shape type=\"cube\"><float name=\"a\" value=\"1\"/><float name=\"b\" value=\"1\"/>\n"
+      "<bsdf type=\"hair\"/><emitter type=\"sun\"/></shape>\n"
+      "<shape type=\"ply\"><string name=\"filename\" value=\"a.ply\"/></shape>\n"
+      "<shape type=\"sphere\"><float name=\"radius\" value=\"$r\"/><ref id=\"steel\"/></shape>\n"
+      "<bsdf type=\"mask\"><ref id=\"wood\"/><bsdf type=\"fur\"/><bsdf type=\"silk\"/></bsdf>\n"
+      "<medium type=\"fog\"/>");
+  std::string message = message_of(files, content, {{"q", "1"}, {"s", "2"}});
+  for (size_t at; (at = message.find(" (")) != message.npos;) {
+    message.erase(at, message.find(')', at) + 1 - at);
+  }
+  EXPECT_EQ(message,
+            "@/s.xml:6:43: error: undefined parameter \"$r\"\n"
+            "@/s.xml: error: -D q=1: the scene has no parameter \"$q\"\n"
+            "@/s.xml: error: -D s=2: the scene has no parameter \"$s\"\n"
+            "@/s.xml:8:1: error: <scene>: unknown element <medium>\n"
+            "@/s.xml:6:60: error: there is no object with the id \"steel\"\n"
+            "@/s.xml:7:24: error: there is no object with the id \"wood\"\n"
+            "@/s.xml:4:1: error: unknown bsdf type \"hair\"\n"
+            "@/s.xml:4:20: error: unknown type \"sun\" of an emitter inside a shape\n"
+            "@/s.xml:3:20: error: shape \"cube\": unknown parameter \"a\"\n"
+            "@/s.xml:3:47: error: shape \"cube\": unknown parameter \"b\"\n"
+            "@/s.xml:5:19: error: shape \"ply\": filename: no such file: \"a.ply\"\n"
+            "@/s.xml:7:35: error: unknown bsdf type \"fur\"\n"
+            "@/s.xml:7:53: error: unknown bsdf type \"silk\"\n"
+            "13 errors");
+}
+
+// Whatever refers to an object that failed, directly or by others, has no error of its own.
+TEST(BadScene, WhatFollowsFromAMistakeIsNotReported) {
+  const TempFiles files;
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      {"<bsdf type=\"hair\" id=\"a\"/><shape type=\"cube\"><ref id=\"a\"/></shape>"
+       "<bsdf type=\"twosided\"><ref id=\"a\"/></bsdf><alias id=\"a\" as=\"b\"/>"
+       "<shape type=\"cube\"><ref id=\"b\"/></shape>",
+       "3:1: error: unknown bsdf type"},
+      {"<medium type=\"fog\" id=\"a\"><bsdf type=\"diffuse\" id=\"b\"/></medium>"
+       "<shape type=\"cube\"><ref id=\"a\"/></shape><shape type=\"cube\"><ref id=\"b\"/></shape>",
+       "3:1: error: <scene>: unknown element"},
+      {"<shape type=\"cube\"><ref id=\"a\"/></shape><shape type=\"cube\"><ref id=\"a\"/></shape>",
+       "3:25: error: there is no object"},
+      {"<sensor type=\"perspective\"><film type=\"hdrfilm\"><integer name=\"crop_width\" "
+       "value=\"$w\"/><integer name=\"width\" value=\"1\"/></film></sensor>",
+       "3:76: error: undefined parameter"},
+      {"<include filename=\"no.xml\"/><shape type=\"$t\"/><shape type=\"cube\"><ref "
+       "id=\"a\"/></shape>",
+       "3:10: error: no such file"},
+      {"<path value=\"no\"/><include filename=\"no.xml\"/><shape type=\"torus\"/>",
+       "3:7: error: no such directory"},
+      {"<shape type=\"shapegroup\" id=\"g\"><shape type=\"torus\"/></shape>"
+       "<shape type=\"instance\"><ref id=\"g\"/></shape><shape type=\"instance\"><ref "
+       "id=\"g\"/></shape>",
+       "3:33: error: unknown shape type"},
+  };
+  for (const auto& [body, begin] : cases) {
+    const std::string message = message_of(files, scene(body), {});
+    EXPECT_EQ(message.find("@/s.xml:" + begin), 0u) << message;
+    EXPECT_EQ(message.find('\n'), message.npos) << message;
+  }
+  EXPECT_EQ(message_of(files, "<scene version=\"3.0.0\"><sensor type=\"fisheye\"/></scene>", {}),
+            "@/s.xml:1:24: error: unknown sensor type \"fisheye\" (known: orthographic, "
+            "perspective, thinlens)");
+}
+
+TEST(BadScene, TwentyMistakesAreEnough) {
+  const TempFiles files;
+  for (const std::string& body :
+       {repeated(30, "<film type=\"#\" size=\"1\"/>\n"),
+        repeated(30, "<shape type=\"cube\"><bsdf type=\"#\"/></shape>\n"),
+        "<bsdf type=\"diffuse\">" + repeated(30, "<float name=\"a#\" value=\"1\"/>\n") +
+            "</bsdf>"}) {
+    const std::string message = message_of(files, scene(body), {});
+    EXPECT_EQ(std::count(message.begin(), message.end(), '\n'), 20) << message;
+    EXPECT_TRUE(message.ends_with("\n20 errors, and what follows is not read")) << message;
+  }
 }
 
 // Mistakes inside nested elements must never be taken for a valid scene, however a valid file is

@@ -99,6 +99,15 @@ def test_mistakes_have_a_place(folder, change, text):
     assert re.match(text, str(error.value)), str(error.value)
 
 
+def test_mistakes_are_told_together(folder):
+    wrong = {"ball": {"type": "sphere", "radius": -1}, "box": {"type": "cube", "size": 2}}
+    with pytest.raises(limn.InputError) as error:
+        limn.load_dict({**scene_dict(), **wrong}, str(folder))
+    lines = str(error.value).splitlines()
+    places = ["dict.ball.radius", "dict.box.size"]
+    assert [line.split(": ")[0] for line in lines] == [*places, "2 errors"]
+
+
 def test_warnings_have_a_place(tmp_path):
     (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 2\n")
     with pytest.warns(UserWarning, match="1 of 2 faces"):
