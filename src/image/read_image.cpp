@@ -74,7 +74,7 @@ StoredImage read_stored_image(const std::string& file) {
     if (!data) throw InputError({file}, "cannot read the file");
     return format.read(file, *data);
   }
-  throw InputError({file}, "is no image that is read (known: BMP, EXR, JPEG, PNG, RGBE)");
+  throw InputError({file}, "is no image that is read (known: BMP, EXR, JPEG, PNG, Radiance RGBE)");
 }
 
 Image read_image(const std::string& file) {

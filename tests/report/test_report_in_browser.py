@@ -119,6 +119,12 @@ class TestReportInBrowser(unittest.TestCase):
             )
         self.browser.show(1280)
 
+    def test_tables_fit_a_window_of_1280(self):
+        cut = self.browser.evaluate("""[...document.querySelectorAll('.scroll')].filter(
+            e => e.checkVisibility() && e.scrollWidth > e.clientWidth)
+            .map(e => [e.getAttribute('aria-label'), e.scrollWidth, e.clientWidth])""")
+        self.assertEqual(cut, [])
+
     def test_prints_on_white(self):
         self.browser.show(1280, "dark", "print")
         self.assertEqual(

@@ -139,7 +139,8 @@ TEST(ImageFormats, HostileFilesAreRefused) {
   using namespace std::string_literals;  // NOLINT: for zeros inside
   EXPECT_EQ(error_of(files.path("none")), "cannot read: No such file or directory");
   EXPECT_EQ(error(""), "cannot read: the file is empty");
-  EXPECT_EQ(error("P6 1 1 255 abc"), "is no image that is read (known: BMP, EXR, JPEG, PNG, RGBE)");
+  EXPECT_EQ(error("P6 1 1 255 abc"),
+            "is no image that is read (known: BMP, EXR, JPEG, PNG, Radiance RGBE)");
   EXPECT_EQ(error(png_of_size("\x80\0\0\0\0\0\0\1"s)),
             "the PNG file is truncated or damaged: PNG unsigned integer out of range");
   EXPECT_EQ(error(png_of_size("\x7f\xff\xff\xff\0\0\0\1"s)),

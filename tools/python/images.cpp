@@ -61,7 +61,8 @@ void bind_images(nb::module_& m) {
   m.def(
       "read_image", [](nb::handle file) { return to_array(read_image(to_path("file", file))); },
       nb::arg("file"), nb::sig("def read_image(file: str | os.PathLike[str]) -> numpy.ndarray"),
-      "Pixels of an EXR, PNG, JPEG, RGBE or BMP image, linear: float32, (H, W, 3) or (H, W, 1). "
+      "Pixels of an EXR, PNG, JPEG, Radiance RGBE (.hdr) or BMP image, linear: float32, (H, W, 3) "
+      "or (H, W, 1). "
       "Images of eight bits are decoded from sRGB; alpha is dropped.");
   m.def(
       "read_exr", [](nb::handle file) { return to_array(read_exr(to_path("file", file))); },

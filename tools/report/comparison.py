@@ -55,7 +55,13 @@ def time_ratios(data):
 
 
 def _error(key):
-    return lambda self, m, s: with_error(s.number(key), s.number(f"{key}_stderr"))
+    """A value above its error, so that all columns fit into 1280 pixels."""
+
+    def cell(self, m, s):
+        value, *error = with_error(s.number(key), s.number(f"{key}_stderr")).split("\u00a0±")
+        return element("td", value, *([element("br"), f"±{error[0]}"] if error else []))
+
+    return cell
 
 
 def _number(key, text=figures):
