@@ -55,7 +55,7 @@ struct SceneDescription {
 };
 
 // Parses a scene file and resolves all references. Unknown elements, attributes and references,
-// and duplicate ids and properties, go to `errors`; InputError for what leaves no scene to describe.
+// and duplicate ids and properties, go to `errors`; InputError where nothing is left to describe.
 // Objects that failed are there without what failed. text: see load_scene_tree().
 SceneDescription describe_scene(const std::string& file, const SceneInput& input,
                                 const std::string* text, ErrorList& errors);
