@@ -29,10 +29,18 @@ class Package(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         shutil.rmtree(WORK, ignore_errors=True)
-        run(CMAKE, "--install", BUILD, "--prefix", PREFIX, "--component", "limn")
-        run(CMAKE, "-S", HERE, "-B", CONSUMER, "-G", "Ninja", f"-DCMAKE_PREFIX_PATH={PREFIX}",
-            "-DCMAKE_BUILD_TYPE=Release")
+        run(CMAKE, "--install", BUILD, "--prefix", PREFIX)
+        cls.configured = run(CMAKE, "-S", HERE, "-B", CONSUMER, "-G", "Ninja",
+                             f"-DCMAKE_PREFIX_PATH={PREFIX}", "-DCMAKE_BUILD_TYPE=Release")
         run(CMAKE, "--build", CONSUMER)
+
+    # The Python module belongs into a wheel.
+    def test_prefix_holds_the_package_alone(self):
+        self.assertEqual(sorted(os.listdir(PREFIX)), ["bin", "include", "lib", "share"])
+
+    def test_finding_it_says_nothing_of_its_dependencies(self):
+        for word in ("Warning", "warning", "not exist", "not found"):
+            self.assertNotIn(word, self.configured)
 
     # The closed form's mean, within five standard errors (two sides: 6e-7).
     def test_program_renders_what_the_closed_form_says(self):
