@@ -99,6 +99,51 @@ def test_mistakes_have_a_place(folder, change, text):
     assert re.match(text, str(error.value)), str(error.value)
 
 
+# A mesh of arrays is that of a file.
+def test_meshes_are_arrays(folder, tmp_path):
+    vertices = np.array([[0, 1, 0], [1, 0, 0], [-1, 0, 0], [0, 0, 1], [0, 0, -1]])
+    faces = np.array([[0, 1, 4], [0, 4, 2], [0, 2, 3], [0, 3, 1]])
+    limn.write_ply(tmp_path / "a.ply", vertices, faces)
+    shapes = [{"type": "mesh", "vertices": np.asfortranarray(vertices), "faces": faces.tolist()},
+              {"type": "mesh", "filename": str(tmp_path / "a.ply")},
+              {"type": "ply", "filename": str(tmp_path / "a.ply")}]
+    for more in ({}, {"face_normals": True, "bsdf": {"type": "ref", "id": "metal"}}):
+        read = [limn.load_dict({**scene_dict(), "roof": {**s, **more}}, str(folder)) for s in shapes]
+        assert read[0].mesh("roof").positions.shape == (5, 3)
+        for scene in read[:2]:
+            assert same(limn.render(scene).value, limn.render(read[2]).value)
+
+
+@pytest.mark.parametrize("mesh, text", [
+    ({}, "give vertices and faces, or a filename"),
+    ({"vertices": [[0, 0, 0]]}, "give vertices and faces, or a filename"),
+    ({"vertices": [[0, 0, 0]], "faces": [[0, 0, 1]]}, "faces name vertices 0 to 1 of 1"),
+    ({"vertices": [[0, 0]], "faces": [[0, 0, 0]]}, r"positions have shape \(V, 3\), not \(1, 2\)"),
+    ({"vertices": [[0, 0, 0], [1, 0, 0], [0, np.nan, 0]], "faces": [[0, 1, 2]]}, ".*not finite"),
+    ({"vertices": [[0, 0, 0]], "faces": [[0, 0, 0]], "filename": "a.ply"}, "give vertices"),
+])
+def test_mistakes_in_meshes_have_a_place(mesh, text):
+    with pytest.raises(limn.InputError, match=rf"^dict\.roof: error: {text}"):
+        limn.load_dict({"type": "scene", "eye": {"type": "perspective"},
+                        "roof": {"type": "mesh", **mesh}})
+
+
+def test_trimesh_reads_other_files(tmp_path):
+    trimesh = pytest.importorskip("trimesh")
+    box = trimesh.creation.box()
+    for ending in ("stl", "glb", "off"):
+        box.export(tmp_path / f"box.{ending}")
+        scene = limn.load_dict({"type": "scene", "eye": {"type": "perspective"},
+                                "box": {"type": "mesh", "filename": f"box.{ending}"}}, tmp_path)
+        mesh = scene.mesh("box")
+        assert len(mesh.faces) == 12 and len(np.unique(mesh.weld)) == 8
+        assert np.abs(mesh.positions).max() == 0.5
+    (tmp_path / "not.stl").write_text("no mesh")
+    for name in ("not.stl", "none.glb"):
+        with pytest.raises(limn.InputError, match=r"^dict\.box: error: "):
+            limn.load_dict({"type": "scene", "box": {"type": "mesh", "filename": name}}, tmp_path)
+
+
 def test_mistakes_are_told_together(folder):
     wrong = {"ball": {"type": "sphere", "radius": -1}, "box": {"type": "cube", "size": 2}}
     with pytest.raises(limn.InputError) as error:

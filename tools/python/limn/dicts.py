@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import numbers
+import os
 import re
+import tempfile
 import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -14,6 +16,7 @@ import numpy.typing as npt
 
 from ._limn import Scene, load_string
 from .errors import InputError
+from .meshes import read_foreign, write_ply
 
 # The element that each type is written as: the types that the reader of files knows.
 TYPES = {
@@ -95,11 +98,16 @@ def _checked(place: str, name: Any) -> str:
 
 
 class _Writer:
-    """XML with one element a line, and for each line what it came from."""
+    """XML with one element a line, and for each line what it came from.
 
-    def __init__(self) -> None:
+    Files are in `folder`; meshes of the dictionary become files in `scratch`.
+    """
+
+    def __init__(self, folder: str, scratch: str) -> None:
+        self.folder, self.scratch = folder, scratch
         self.lines: list[str] = []
         self.places: list[str] = []
+        self.files: dict[str, str] = {}  # the place of each mesh
 
     def line(self, place: str, text: str) -> None:
         self.lines.append(text)
@@ -110,6 +118,8 @@ class _Writer:
         self.line(place, f"<{tag}{words}{end}>")
 
     def object(self, place: str, name: str, what: Mapping[str, Any]) -> None:
+        if what.get("type") == "mesh":
+            what = self.mesh(place, what)
         kind = what.get("type")
         if not isinstance(kind, str):
             raise InputError(f'{place}: error: expected a word for "type", not {kind!r}')
@@ -120,7 +130,7 @@ class _Writer:
             self.element(place, kind, name=name, value=_three(what.get("value", ())))
             return
         if kind not in _TAGS:
-            known = ", ".join(sorted([*_TAGS, "ref", "rgb"]))
+            known = ", ".join(sorted([*_TAGS, "mesh", "ref", "rgb"]))
             raise InputError(f'{place}: error: unknown type "{kind}" (known: {known})')
         tag = _TAGS[kind]
         attributes = {"type": kind}
@@ -132,6 +142,25 @@ class _Writer:
             if key not in ("type", "id"):
                 self.value(f"{place}.{key}", _checked(f"{place}.{key}", key), value)
         self.line(place, f"</{tag}>")
+
+    def mesh(self, place: str, what: Mapping[str, Any]) -> dict[str, Any]:
+        """The same shape with a mesh that limn reads: of a file, or of arrays."""
+        rest = {k: v for k, v in what.items() if k not in ("vertices", "faces", "filename")}
+        file = what.get("filename")
+        if (file is None) != ("vertices" in what and "faces" in what):
+            raise InputError(f"{place}: error: give vertices and faces, or a filename")
+        if isinstance(file, str) and file.lower().endswith((".obj", ".ply")):
+            return {**rest, "type": file.lower()[-3:], "filename": file}
+        path = os.path.join(self.scratch, f"{len(self.files)}.ply")
+        self.files[path] = place
+        try:
+            if file is None:
+                write_ply(path, what["vertices"], what["faces"])
+            else:
+                write_ply(path, *read_foreign(os.path.join(self.folder, file)))
+        except (TypeError, ValueError) as error:
+            raise InputError(f"{place}: error: {error}") from None
+        return {**rest, "type": "ply", "filename": path}
 
     def value(self, place: str, name: str, value: Any) -> None:
         if isinstance(value, Mapping):
@@ -175,11 +204,18 @@ def load_dict(scene: Mapping[str, Any], folder: str = "") -> Scene:
 
     Keys are the names of shapes, materials and lights; those inside others have names with a dot
     ("ball.bsdf.reflectance"), unless they say "id". {"type": "ref", "id": ...} names one that stands
-    before. Files are looked for in `folder`. Raises limn.InputError with the place: dict.ball.bsdf.
+    before. {"type": "mesh", "vertices": (V, 3), "faces": (F, 3)} is a shape of arrays; with a
+    "filename" in their place it is one of a file, of STL, glTF and other formats if trimesh is
+    installed. Files are looked for in `folder`. Raises limn.InputError with the place:
+    dict.ball.bsdf.
     """
     if not isinstance(scene, Mapping) or scene.get("type") != "scene":
         raise InputError('dict: error: expected {"type": "scene", ...}')
-    writer = _Writer()
+    with tempfile.TemporaryDirectory(prefix="limn_") as scratch:
+        return _load(scene, _Writer(os.fspath(folder), scratch))
+
+
+def _load(scene: Mapping[str, Any], writer: _Writer) -> Scene:
     writer.line("dict", '<scene version="3.0.0">')
     for name, value in scene.items():
         if name == "type":
@@ -190,6 +226,8 @@ def load_dict(scene: Mapping[str, Any], folder: str = "") -> Scene:
     writer.line("dict", "</scene>")
 
     def placed(text: str) -> str:
+        for file, place in writer.files.items():
+            text = text.replace(file, place)
         return re.sub(
             r"[^\s\"]*string:(\d+)(:\d+)?", lambda m: writer.places[int(m.group(1)) - 1], text
         )
@@ -197,9 +235,9 @@ def load_dict(scene: Mapping[str, Any], folder: str = "") -> Scene:
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         try:
-            read = load_string("\n".join(writer.lines), folder)
+            read = load_string("\n".join(writer.lines), writer.folder)
         except InputError as error:
             raise type(error)(placed(str(error))) from None
     for warning in told:
-        warnings.warn(placed(str(warning.message)), stacklevel=2)
+        warnings.warn(placed(str(warning.message)), stacklevel=3)
     return read

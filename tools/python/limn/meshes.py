@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -42,6 +43,21 @@ def write_ply(
     finally:
         if os.path.exists(unfinished):
             os.remove(unfinished)
+
+
+def read_foreign(file: str) -> tuple[Any, Any]:
+    """Positions and faces of a file that trimesh reads (STL, glTF, OFF, ...)."""
+    try:
+        import trimesh
+    except ImportError:
+        raise InputError("such files are read by trimesh: pip install trimesh") from None
+    if not os.path.isfile(file):
+        raise InputError(f'no such file: "{file}"')
+    try:
+        mesh = trimesh.load(file, force="mesh", process=False)
+    except Exception as error:  # of many kinds, one or more for each format
+        raise InputError(f"trimesh cannot read {file}: {error}") from None
+    return mesh.vertices, mesh.faces
 
 
 def _header(vertices: int, faces: int) -> bytes:
