@@ -217,7 +217,7 @@ TEST(MovingDirections, TakeOutWhatSlidesForEveryParameter) {
   const auto variances_times_rays = [&](const std::string& method) {
     std::vector<double> sums(parameters.size());
     for (const uint64_t seed : {1, 2, 3, 4}) {
-      const GradientResult result = run_method(scene, parameters, method, 128, seed);
+      const GradientResult result = run_method(scene, parameters, method, 64, seed);
       uint64_t rays = 0;
       for (const auto& term : result.terms) rays += term.cost.rays;
       for (size_t k = 0; k < sums.size(); ++k)

@@ -88,9 +88,9 @@ TEST(SharpShadowsMissing, AreNoticedAndNamed) {
                          {0.2, 0.9, 0.3}, diffuse("clay", "0.6, 0.4, 0.3")) +
                kBulb;
   const Scene scene = make_scene(files, parts);
-  EXPECT_NE(run_check(scene, "ball.translate.x", 1024).verdict, Verdict::kDisagree);
+  EXPECT_NE(run_check(scene, "ball.translate.x", 256).verdict, Verdict::kDisagree);
   const CheckResult r =
-      run_check(scene, "ball.translate.x", 1024, {"interior", "camera", "boundary"});
+      run_check(scene, "ball.translate.x", 256, {"interior", "camera", "boundary"});
   EXPECT_EQ(r.verdict, Verdict::kDisagree);
   EXPECT_EQ(r.suspect, "shadow");
 }

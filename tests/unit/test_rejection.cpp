@@ -268,6 +268,89 @@ TEST(RejectionTree, ForestsAndLiHaveOneOthersDoNot) {
   EXPECT_EQ(std::find(names.begin(), names.end(), "brute"), names.end());
 }
 
+using Planes = std::vector<std::array<double, 4>>;  // n, distance of the origin
+
+// The planes of the faces at these edges, seen from an origin.
+Planes planes_of(const EdgeMesh& mesh, std::span<const EdgeRef> edges, const Vec3d& origin) {
+  Planes planes;
+  for (const EdgeRef id : edges) {
+    for (const FaceId face : mesh.edge(id.edge).faces) {
+      const Plane& plane = mesh.plane(face);
+      planes.push_back({plane.n.x, plane.n.y, plane.n.z, plane.distance(origin)});
+    }
+  }
+  return planes;
+}
+
+struct Interval {
+  double middle, half;
+};
+// Of the values of a function of planes, wider by a factor.
+template <class F>
+Interval interval_of(const Planes& planes, double wider, F f) {
+  double low = f(planes[0]), high = low;
+  for (const auto& plane : planes) low = std::min(low, f(plane)), high = std::max(high, f(plane));
+  return {0.5 * (low + high), 0.5 * wider * (high - low)};
+}
+
+// Nowrouzezahrai et al. 2014: no plane of the box goes through w.
+bool misses_dual_box(const Planes& planes, const Vec3d& w, double radius, double wider) {
+  const double x[4] = {w.x / radius, w.y / radius, w.z / radius, 1};
+  double middle = 0, reach = 0;
+  for (int i = 0; i < 4; ++i) {
+    const Interval box =
+        interval_of(planes, wider, [&](const auto& q) { return i < 3 ? q[i] : q[3] / radius; });
+    middle += box.middle * x[i];
+    reach += box.half * std::fabs(x[i]);
+  }
+  return std::fabs(middle) > reach;
+}
+
+// Li et al. 2018: the sphere over the segment from the origin to w misses the box of the feet of the
+// planes.
+bool misses_hough_box(const Planes& planes, const Vec3d& w, double wider) {
+  double nearest = 0, farthest = 0;
+  for (int i = 0; i < 3; ++i) {
+    const Interval box = interval_of(planes, wider, [&](const auto& q) { return -q[i] * q[3]; });
+    const double away = std::fabs(box.middle - 0.5 * w[i]);
+    nearest += std::pow(std::max(away - box.half, 0.0), 2);
+    farthest += std::pow(away + box.half, 2);
+  }
+  const double radius = 0.5 * length(w);
+  return nearest > radius * radius || farthest < radius * radius;
+}
+
+// Nodes reject what a box around their planes would miss that were wider by a tenth.
+TEST(RejectionTree, BoxesOfPlanesAreTight) {
+  const EdgeSamplerInput input{{build_edge_mesh(with_smooth_normals(torus_mesh(30, 20)), true)}};
+  const EdgeMesh& mesh = input.objects[0];
+  Bounds bounds;
+  for (const Vec3d& x : mesh.positions) bounds.extend(x);
+  for (const char* name : {"brute:search=dual-bvh", "li2019"}) {
+    Rng rng(33, 0, 0);
+    const auto sampler = make_edge_sampler(name, input, 1);
+    const auto tree = sampler->rejection_tree();
+    int missed = 0;
+    for (uint32_t node = 0; node < tree->nodes().size(); ++node) {
+      const auto smooth = [&](EdgeRef id) {
+        return mesh.edge(id.edge).edge_class == EdgeClass::kSmooth;
+      };
+      if (!std::ranges::all_of(tree->edges(node), smooth)) continue;
+      const Planes planes = planes_of(mesh, tree->edges(node), bounds.center());
+      for (int i = 0; i < 20; ++i) {
+        const Vec3d p = random_direction(rng) * (3 * rng.uniform()), w = p - bounds.center();
+        const bool misses = name == std::string("li2019")
+                                ? misses_hough_box(planes, w, 1.1)
+                                : misses_dual_box(planes, w, 0.5 * bounds.diagonal(), 1.1);
+        if (!misses) continue;
+        ++missed;
+        EXPECT_TRUE(tree->rejects(node, p)) << name << " " << node;
+      }
+    }
+    EXPECT_GT(missed, 1000) << name;
+  }
+}
+
 TEST(RejectionTree, OfTheForestReachesWhatItLists) {
   Rng rng(32, 0, 0);
   const EdgeSamplerInput input{{build_edge_mesh(with_smooth_normals(torus_mesh(30, 20)), true)}};
