@@ -172,6 +172,66 @@ def test_torch_refuses_arrays_without_a_value_and_second_derivatives(scene):
         slope.backward()
 
 
+# Installed by tools/python/venv where PyPI has it.
+def test_jax_gets_what_backward_finds(scene, adjoint):
+    jax = pytest.importorskip("jax")
+    import limn.jax as bridge
+
+    values = {POSITIONS: scene[POSITIONS] + np.float32(0.05), "metal.alpha": np.float32(0.3),
+              "clay.reflectance": np.float32(0.5), "ball.translate.x": np.float32(0.1)}
+
+    def loss(values, seed):
+        image = bridge.render(scene, values, spp=2, spp_grad=8, seed=seed)
+        return (image * adjoint).sum(), image
+
+    before = limn.render(scene, spp=2).value
+    for run in (loss, jax.jit(loss)):  # the seed is traced in the second
+        (_, image), found = jax.value_and_grad(run, has_aux=True)(values, 4)
+        moved = scene.copy()
+        for name, value in values.items():
+            if name != "ball.translate.x":
+                moved[name] = value
+        moved.move("ball.translate.x", values["ball.translate.x"])
+        assert same(np.asarray(image), limn.render(moved, spp=2, seed=8).value)
+        asked = [*values, *(f"ball.translate.{k}" for k in "yz")]
+        expected = limn.backward(moved, np.asarray(adjoint, np.float32), asked, spp=8, seed=9)
+        for name, value in values.items():
+            slope = np.float32(expected[name].value)
+            assert np.array_equal(found[name], slope if slope.size == value.size else slope.sum())
+    assert same(limn.render(scene, spp=2).value, before)
+
+
+# About z by a right angle; then Rodrigues' formula, whose derivative at rest is a cross product.
+def check_pose(pose, derivative):
+    p = np.array([[0, 0, 0], [2, 0, 0], [0, 4, 2]], dtype=float)
+    assert np.allclose(pose(p, [0, 0, np.pi / 2], [0, 0, 1]),
+                       [[3, 1, 1], [3, 3, 1], [-1, 1, 3]], atol=1e-6)
+    axis, angle = np.array([0.6, 0, 0.8]), 0.7
+    arm = p - [1, 2, 1]
+    turned = (arm * np.cos(angle) + np.cross(axis, arm) * np.sin(angle)
+              + np.outer(arm @ axis, axis) * (1 - np.cos(angle)))
+    assert np.allclose(pose(p, axis * angle, [0, 0, 0]), turned + [1, 2, 1], atol=1e-6)
+    expected = np.stack([np.cross(e, arm) for e in np.eye(3)], axis=-1)
+    assert np.allclose(derivative(p), expected, atol=1e-6)
+
+
+def test_pose_of_jax():
+    jax = pytest.importorskip("jax")
+    import limn.jax as bridge
+
+    check_pose(bridge.pose, lambda p: jax.jacobian(lambda t: bridge.pose(p, t))(np.zeros(3)))
+
+
+def test_pose_of_torch():
+    torch, bridge = torch_and_bridge()
+
+    def pose(*arrays):
+        return bridge.pose(*map(torch.tensor, arrays)).numpy()
+
+    check_pose(pose, lambda p: torch.autograd.functional.jacobian(
+        lambda t: bridge.pose(torch.tensor(p), t), torch.zeros(3, dtype=torch.float64)).numpy())
+
+
 def test_a_limit_of_time_gives_as_many_samples_as_fit(scene, adjoint):
     name = "metal.alpha"
     short = limn.backward(scene, adjoint, name, seconds=0.01)[name]

@@ -8,11 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from ._limn import Scene
+from ._limn import Scene, backward
 from .errors import InputError
 
 _MOTION = re.compile(r"\.(scale|(rotate|translate)\.[xyz])$")
 _ORDER = {"scale": 0, "rotate": 1, "translate": 2}
+
+
+def per_number(slope: Any, shape: tuple[int, ...]) -> Any:
+    """A derivative in the shape of what was given: one number sets all channels of a colour."""
+    slope = np.asarray(slope)
+    return (slope if slope.size == np.prod(shape) else slope.sum()).reshape(shape)
 
 
 def _center(scene: Scene, shape: str) -> Any:
@@ -81,8 +87,14 @@ class Motions:
                 names += [f"{owner}.translate.{axis}" for axis in "xyz"]
         return list(dict.fromkeys(names))
 
+    def backward(self, scene: Scene, adjoint: Any, wanted: list[str], spp: int | None, seed: int,
+                 threads: int) -> dict[str, Any]:
+        """The derivatives with respect to what was given; scene: the one that came out."""
+        slopes = backward(scene, adjoint, self.names_for(wanted), spp=spp, seed=seed,
+                          threads=threads)
+        return {n: self.slope(n, slopes, scene) for n in wanted}
+
     def slope(self, name: str, slopes: Mapping[str, Any], scene: Scene) -> Any:
-        """The derivative with respect to what was given; scene: the one that came out."""
         slope = slopes[name].value
         owner, kind, axis = self.split(name) if name in self.steps else ("", "", 0)
         if owner not in self.centers or kind == "translate":

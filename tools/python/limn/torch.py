@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 import torch
 
-from . import Scene, backward as _backward, render as _render
-from .motions import Motions
+from . import Scene, render as _render
+from .motions import Motions, per_number
 
-__all__ = ["render"]
+__all__ = ["pose", "render"]
 
 
 # PyTorch never frees the graphs that are alive when Python ends. Scenes are taken out of them
@@ -68,10 +68,7 @@ class _Render(torch.autograd.Function):
         wanted = [n for n, need in zip(names, ctx.needs_input_grad[6:]) if need]
         found = {}
         if wanted:
-            asked = motions.names_for(wanted)
-            slopes = _backward(scene, adjoint.cpu().numpy(), asked, spp=spp, seed=seed,
-                               threads=threads)
-            found = {n: motions.slope(n, slopes, scene) for n in wanted}
+            found = motions.backward(scene, adjoint.cpu().numpy(), wanted, spp, seed, threads)
         gradients = [
             _gradient(found[n], t) if n in found else None
             for n, t in zip(names, ctx.saved_tensors)
@@ -80,9 +77,7 @@ class _Render(torch.autograd.Function):
 
 
 def _gradient(value: Any, tensor: Any) -> Any:
-    # One number sets all channels of a colour.
-    value = np.array(value if value.size == tensor.numel() else value.sum())
-    return torch.from_numpy(value).to(tensor).reshape(tensor.shape)
+    return torch.from_numpy(np.array(per_number(value, tuple(tensor.shape)))).to(tensor)
 
 
 def _check(scene: Scene, values: Mapping[str, torch.Tensor]) -> None:
@@ -121,3 +116,19 @@ def render(
     names = list(values)
     spp_grad = spp if spp_grad is None else spp_grad
     return _Render.apply(scene, names, spp, spp_grad, seed, threads, *values.values())
+
+
+def pose(
+    positions: torch.Tensor, turn: torch.Tensor, shift: torch.Tensor | None = None
+) -> torch.Tensor:
+    """Positions (V, 3), turned about the center of their bounds and then moved by `shift`.
+
+    turn: (3,), the axis of the rotation times its angle [radians]. Differentiable in all three, also
+    where nothing turns.
+    """
+    x, y, z = turn
+    zero = torch.zeros_like(x)
+    cross = torch.stack([zero, -z, y, z, zero, -x, -y, x, zero]).reshape(3, 3)
+    center = (positions.amin(0) + positions.amax(0)) / 2
+    turned = (positions - center) @ torch.matrix_exp(cross).to(positions.dtype).T + center
+    return turned if shift is None else turned + shift
