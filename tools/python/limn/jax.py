@@ -26,6 +26,8 @@ from .motions import Motions, per_number
 
 __all__ = ["pose", "render"]
 
+_Shape: Any = jax.ShapeDtypeStruct  # which has no types
+
 
 # What is no array: JAX takes calls with equal fields for the same.
 @dataclass(frozen=True)
@@ -51,7 +53,7 @@ class _Call:
 
 @partial(jax.custom_vjp, nondiff_argnums=(0,))
 def _image(call: _Call, values: dict[str, Any], seed: Any) -> Any:
-    shape = jax.ShapeDtypeStruct((call.scene.height, call.scene.width, 3), jnp.float32)
+    shape = _Shape((call.scene.height, call.scene.width, 3), jnp.float32)
     return jax.pure_callback(call.image, shape, values, seed, vmap_method="sequential")
 
 
@@ -61,7 +63,7 @@ def _forward(call: _Call, values: dict[str, Any], seed: Any) -> Any:
 
 def _backward(call: _Call, kept: Any, adjoint: Any) -> Any:
     values, seed = kept
-    shapes = {n: jax.ShapeDtypeStruct(v.shape, v.dtype) for n, v in values.items()}
+    shapes = {n: _Shape(v.shape, v.dtype) for n, v in values.items()}
     found = jax.pure_callback(call.slopes, shapes, values, seed, adjoint, vmap_method="sequential")
     return found, np.zeros(np.shape(seed), jax.dtypes.float0)
 

@@ -54,7 +54,7 @@ def read_foreign(file: str) -> tuple[Any, Any]:
     if not os.path.isfile(file):
         raise InputError(f'no such file: "{file}"')
     try:
-        mesh = trimesh.load(file, force="mesh", process=False)
+        mesh: Any = trimesh.load(file, force="mesh", process=False)
     except Exception as error:  # of many kinds, one or more for each format
         raise InputError(f"trimesh cannot read {file}: {error}") from None
     return mesh.vertices, mesh.faces
