@@ -31,13 +31,17 @@ CameraRay<Dual> shifted_ray(const Camera& camera, double x, double y) {
   return view.ray(Dual(x, {1, 0, 0, 0}), Dual(y, {0, 1, 0, 0}));
 }
 
-bool is_hidden(const PathContext& context, const FilmPoint& point, FaceRef face, RayCount& rays) {
+Ray ray_to(const Scene& scene, const FilmPoint& point, FaceRef face) {
   Ray ray{value(point.ray.origin), point.omega, point.ray.t_min,
           point.distance * (1 - 0x1p-20)};  // as shadow rays end
   ray.end = face;
-  ray.skip_emitters = context.scene.hide_emitters;
+  ray.skip_emitters = scene.hide_emitters;
+  return ray;
+}
+
+bool is_hidden(const PathContext& context, const FilmPoint& point, FaceRef face, RayCount& rays) {
   ++rays.shadow;
-  return context.tracer.occluded(ray);
+  return context.tracer.occluded(ray_to(context.scene, point, face));
 }
 
 // ds = (W / (2 tan_x))^2 / cos^3 domega, with W the film's width in pixels, tan_x that of half its

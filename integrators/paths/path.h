@@ -144,6 +144,7 @@ class PathTracer {
   bool turn_smoothly(Walk& walk) const;
   bool hides_edges(Walk& walk, const Vec3d& wo) const;
   size_t turn_smoothly(Walk** walks, size_t& count, Walk** turned) const;
+  void leave_straight(Walk& walk) const;
   void leave_surface(Walk& walk, double eta) const;
   // path_wide.h. For plain numbers.
   size_t weigh_lights_wide(std::span<Walk* const> walks, Walk** lit) const;

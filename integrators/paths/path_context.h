@@ -26,6 +26,8 @@ struct PathContext {
   const Scene* unmoved = nullptr;
   // By way of which edges are seen; null where there are none, or no path starts beside an edge.
   const FlatMirrors* flat_mirrors = nullptr;
+  // Whether edges are seen straight through surfaces (straight_way.h).
+  bool straight_ways = false;
 };
 
 // Does nothing at path vertices.

@@ -4,6 +4,7 @@
 
 #include "integrators/paths/path.h"
 #include "integrators/paths/path_directions.h"
+#include "integrators/paths/straight_way.h"
 
 namespace limn {
 
@@ -26,16 +27,22 @@ inline bool PathTracer<S, Visitor>::turns_smoothly(Walk& walk) const {
   return true;
 }
 
-// Whether the edges that the smooth ray wo sees are in no term: the path has come otherwise than by
-// a chain of flat mirrors.
+// Whether the edges that the smooth ray wo sees are in no term: the path has come otherwise than
+// straight on or by a chain of flat mirrors.
 template <class S, class Visitor>
 inline bool PathTracer<S, Visitor>::hides_edges(Walk& walk, const Vec3d& wo) const {
-  if (walk.step.pdf > 0) walk.mirrors = 0;
+  if (walk.step.pdf > 0) {
+    walk.mirrors = 0;
+    walk.was_rough = true;
+  }
+  if (goes_straight(value(walk.wi), wo)) return false;
+  // Shadows of delta lights are seen straight on alone.
+  if (!c_.scene.delta_lights.empty()) return true;
   const Vec3d n = walk.scattering->front() ? walk.surface.n_g : -walk.surface.n_g;
   if (!c_.flat_mirrors || ++walk.mirrors > FlatMirrors::kLongest) return true;
   // From the camera, where that is not a pinhole.
-  const bool from_camera = walk.bounces + 1 == static_cast<int>(walk.mirrors);
-  return (from_camera && !c_.scene.camera.is_pinhole()) || !is_mirrored(n, value(walk.wi), wo) ||
+  return (!walk.was_rough && !c_.scene.camera.is_pinhole()) ||
+         !is_mirrored(n, value(walk.wi), wo) ||
          c_.flat_mirrors->of(walk.surface.face) == FlatMirrors::kNone;
 }
 
@@ -54,7 +61,11 @@ inline bool PathTracer<S, Visitor>::turn_smoothly(Walk& walk) const {
   walk.wo = value(ray.wo);
   walk.pdf = std::numeric_limits<double>::infinity();
   walk.throughput = walk.throughput * ray.weight * (1 / walk.smooth_share);
-  if (walk.scattering->passes(walk.wo)) leave_surface(walk, ray.eta);
+  if (goes_straight(value(walk.wi), walk.wo)) {
+    leave_straight(walk);
+  } else if (walk.scattering->passes(walk.wo)) {
+    leave_surface(walk, ray.eta);
+  }
   return goes_on(walk, 0);
 }
 
@@ -75,6 +86,15 @@ inline size_t PathTracer<S, Visitor>::turn_smoothly(Walk** walks, size_t& count,
   }
   count = kept;
   return turns;
+}
+
+// On from the face itself: a ray that goes straight on is not lifted.
+template <class S, class Visitor>
+inline void PathTracer<S, Visitor>::leave_straight(Walk& walk) const {
+  if (!is_lifted(c_.scene, walk.surface.face.shape)) return;
+  const auto& x = walk.surface.on_face;
+  walk.surface.p = {x[0], x[1], x[2]};
+  walk.surface.lifted = false;
 }
 
 // To the other side of the surface. eta: the index of refraction there over that on this side.

@@ -1,7 +1,7 @@
 // What paths need of a scene, in the order in which one part needs the other.
 #include "integrators/paths/traced_scene.h"
 
-#include "limn/integrators/run.h"
+#include "integrators/paths/straight_way.h"
 
 namespace limn {
 
@@ -17,9 +17,15 @@ TracedScene::TracedScene(const Scene& scene, int threads, const Options& options
       viewpoints_(options.edges ? std::make_unique<Viewpoints>(scene) : nullptr),
       mirrored_(options.closed ? nullptr : MirroredLight::make(scene, lights_)),
       flat_mirrors_(options.edges && find_smooth(scene) ? FlatMirrors::make(scene) : nullptr),
-      context_{scene,         *tracer_,           lights_,
-               closed_.get(), viewpoints_.get(),  mirrored_.get(),
-               nullptr,       flat_mirrors_.get()} {}
+      context_{scene,
+               *tracer_,
+               lights_,
+               closed_.get(),
+               viewpoints_.get(),
+               mirrored_.get(),
+               nullptr,
+               flat_mirrors_.get(),
+               options.edges && has_straight_ways(scene)} {}
 
 TracedScene::TracedScene(const Scene& moved, const PathChoices& choices, int threads)
     : tracer_(make_embree_tracer(moved, threads)),

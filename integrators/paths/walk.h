@@ -57,6 +57,7 @@ struct Walk {
   double albedo = 1;        // bounds it, by the materials of PathContext::unmoved
   double eta = 1;           // the index of refraction here over that where it started
   uint32_t mirrors = 0;     // flat ones that it has come by since it was last rough, if smooth
+  bool was_rough = false;   // before a smooth lobe
   ShapeId turned_by;        // the first shape whose smooth lobe hid edges (hides_edges), if any
   Rgb<double> before_turn;  // what it had found until there
   PathStep step;

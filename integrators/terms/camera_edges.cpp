@@ -109,7 +109,8 @@ void CameraEdges::list() {
       for (uint32_t c = 0; c < clips_.size(); ++c) add_clip(c);
     }
     find_in_line(first);
-    if (v == 0 && visible_) keep_seen(*visible_);
+    // What is seen straight through surfaces is hidden from regions.
+    if (v == 0 && visible_ && !context_.straight_ways) keep_seen(*visible_);
   }
 }
 

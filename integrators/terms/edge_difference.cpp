@@ -6,6 +6,7 @@
 #include "integrators/edges/face_jumps.h"
 #include "integrators/edges/near_faces.h"
 #include "integrators/paths/path_follow.h"
+#include "integrators/paths/straight_way.h"
 #include "limn/core/duplicate_faces.h"
 
 namespace limn {
@@ -170,6 +171,13 @@ class RadianceBeside {
   size_t count_ = 0;
 };
 
+// Up to a face at this distance.
+Ray ending_on(Ray ray, FaceRef face, double distance) {
+  ray.end = face;
+  ray.t_max = std::min(ray.t_max, distance * (1 - 0x1p-20));  // as shadow rays end
+  return ray;
+}
+
 // Across an edge inside of a face, where the face's texture jumps.
 bool texture_difference(const PathContext& context, const FacesAround& around, const EdgeView& view,
                         const Ray& ray, bool known_to_be_seen, RadianceBeside& beside,
@@ -177,11 +185,8 @@ bool texture_difference(const PathContext& context, const FacesAround& around, c
   const FaceRef face = around.faces[0];
   if (ray.skip_emitters && context.scene.shape(face.shape).is_emitter) return false;
   if (!known_to_be_seen) {
-    Ray to_face = ray;
-    to_face.end = face;
-    to_face.t_max = view.distance * (1 - 0x1p-20);  // as shadow rays end
     ++rays.shadow;
-    if (context.tracer.occluded(to_face)) return false;
+    if (context.tracer.occluded(ending_on(ray, face, view.distance))) return false;
   }
   const FaceSide side = side_of_face(context.scene, face, view.x0, normalize(view.x1 - view.x0));
   const bool positive = dot(side.into, view.side) > 0;
@@ -191,17 +196,11 @@ bool texture_difference(const PathContext& context, const FacesAround& around, c
   return true;
 }
 
-}  // namespace
-
-bool edge_difference(const PathContext& context, const EdgeMesh& mesh, const EdgeView& view,
-                     FaceRef start, double t_min, double t_max, int bounces, const Rng& key,
-                     RayCount& rays, Rgb<double>& jump, const RadiancePart& part,
-                     const FaceRef* known_behind) {
-  Ray ray{view.p, view.omega};
-  ray.t_min = t_min;
-  ray.t_max = t_max;
-  ray.start = start;
-  ray.skip_emitters = bounces == 0 && context.scene.hide_emitters;
+// What edge_difference finds where nothing at all may lie before the edge. ray: to it.
+bool difference_in_sight(const PathContext& context, const EdgeMesh& mesh, const EdgeView& view,
+                         Ray ray, int bounces, const Rng& key, RayCount& rays, Rgb<double>& jump,
+                         const RadiancePart& part, const FaceRef* known_behind) {
+  if (view.distance > ray.t_max) return false;
   const FacesAround around = mesh.around(view.id.edge);
   // Both sides share their random numbers: where they hardly differ, so do their estimates.
   RadianceBeside beside(context, view, mesh.of_texture(), bounces,
@@ -245,6 +244,50 @@ bool edge_difference(const PathContext& context, const EdgeMesh& mesh, const Edg
   }
   jump = beside.jump();
   return true;
+}
+
+// The edge as it is seen from another point of the same line.
+bool view_from(const Vec3d& p, EdgeView& view) {
+  const Vec3d w = view.y - p;
+  view.p = p;
+  view.distance = length(w);
+  if (view.distance == 0) return false;
+  view.omega = w / view.distance;
+  view.side = cross(view.x0 - p, view.x1 - p);
+  return true;
+}
+
+}  // namespace
+
+bool edge_difference(const PathContext& context, const EdgeMesh& mesh, const EdgeView& view,
+                     FaceRef start, double t_min, double t_max, int bounces, const Rng& key,
+                     RayCount& rays, Rgb<double>& jump, const RadiancePart& part,
+                     const FaceRef* known_behind) {
+  Ray ray{view.p, view.omega};
+  ray.t_min = t_min;
+  ray.t_max = t_max;
+  ray.start = start;
+  ray.skip_emitters = bounces == 0 && context.scene.hide_emitters;
+  if (difference_in_sight(context, mesh, view, ray, bounces, key, rays, jump, part, known_behind))
+    return true;
+  // What regions emit is seen directly alone, and is no part of what comes straight through.
+  if (!context.straight_ways || part.region) return false;
+  ray.skip_faces = mesh.around(view.id.edge).all;
+  StraightWay way{view.p, start, bounces};
+  EdgeView beyond = view;
+  Hit hit;
+  while (++rays.closest, context.tracer.closest(ending_on(ray, {}, beyond.distance), hit)) {
+    if (!way.pass(context, hit.face, beyond.omega) || !view_from(way.from, beyond)) return false;
+    ray = {beyond.p, beyond.omega};
+    ray.start = way.start;
+    ray.skip_faces = mesh.around(view.id.edge).all;
+    if (difference_in_sight(context, mesh, beyond, ray, way.bounces, key, rays, jump, {},
+                            nullptr)) {
+      jump = jump * way.share;
+      return true;
+    }
+  }
+  return false;
 }
 
 }  // namespace limn

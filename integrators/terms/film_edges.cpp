@@ -1,6 +1,8 @@
 // Where edges lie on the film, and the jump of radiance there.
 #include "integrators/terms/film_edges.h"
 
+#include <limits>
+
 #include "integrators/terms/edge_difference.h"
 
 namespace limn {
@@ -14,7 +16,7 @@ Camera::FilmPoint<double> film_of(const CameraView<Dual>& view, const Vec3d& x) 
 }  // namespace
 
 bool FilmEdges::is_hidden(const EdgeMesh& mesh, EdgeId edge) const {
-  if (!scene().hide_emitters) return false;
+  if (!scene().hide_emitters || context_.straight_ways) return false;
   const auto faces = mesh.faces_around(edge);
   return std::all_of(faces.begin(), faces.end(),
                      [&](const FaceRef face) { return scene().shape(face.shape).is_emitter; });
@@ -61,7 +63,10 @@ bool FilmEdges::place(EdgeRef id, const CameraView<Dual>& view, FilmEdge& edge,
   const Vec3d pinhole = value(view.origin());
   const double rounding = 0x1p-48 * (length(a - pinhole) + length(b - pinhole));
   const double near = std::max(camera.near_clip, rounding);
-  if (!clip_range(depth_a, depth_b - depth_a, near, camera.far_clip, t0, t1)) return false;
+  // Clip planes cut what the camera sees directly.
+  const double far =
+      context_.straight_ways ? std::numeric_limits<double>::infinity() : camera.far_clip;
+  if (!clip_range(depth_a, depth_b - depth_a, near, far, t0, t1)) return false;
   if (image && !image->clip_to_mirror(a, b, t0, t1)) return false;
 
   const auto at = [&](double t) { return a + (b - a) * t; };

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "integrators/paths/straight_way.h"
 #include "limn/core/shading.h"
 
 namespace limn {
@@ -18,20 +19,41 @@ Ray unfolded(const FlatMirrors& mirrors, const FlatMirrors::Chain& chain, const 
   return ray;
 }
 
+namespace {
+
+// Goes straight on, until the ray meets a face of the mirror.
+bool meet_mirror(const PathContext& context, uint32_t mirror, Ray& ray, RayCount& rays,
+                 FaceRef& face, MirrorSight& sight) {
+  StraightWay way{ray.origin, ray.start, sight.bounces, sight.share};
+  Hit hit;
+  while (++rays.closest, context.tracer.closest(ray, hit)) {
+    if (context.flat_mirrors->of(hit.face) == mirror) {
+      face = hit.face;
+      sight.share = way.share;
+      sight.bounces = way.bounces;
+      return true;
+    }
+    if (!context.straight_ways || !way.pass(context, hit.face, ray.direction)) return false;
+    ray = {way.from, ray.direction};
+    ray.start = way.start;
+  }
+  return false;
+}
+
+}  // namespace
+
 bool follow_mirrors(const PathContext& context, const FlatMirrors::Chain& chain, Ray ray,
                     int bounces, RayCount& rays, MirrorSight& sight) {
   const Scene& scene = context.scene;
-  if (scene.max_depth >= 0 && bounces + static_cast<int>(chain.count) >= scene.max_depth)
-    return false;
   sight.by = {};
   sight.share = grey(1.0);
   sight.bounces = bounces;
   for (uint32_t k = 0; k < chain.count; ++k) {
-    Hit hit;
-    ++rays.closest;
-    if (!context.tracer.closest(ray, hit)) return false;
-    if (context.flat_mirrors->of(hit.face) != chain.mirrors[k]) return false;
-    const auto surface = surface_on_ray<double>(scene, hit.face, ray.origin, ray.direction);
+    const int to_come = static_cast<int>(chain.count - k);
+    if (scene.max_depth >= 0 && sight.bounces + to_come >= scene.max_depth) return false;
+    FaceRef face;
+    if (!meet_mirror(context, chain.mirrors[k], ray, rays, face, sight)) return false;
+    const auto surface = surface_on_ray<double>(scene, face, ray.origin, ray.direction);
     const Scattering<double> scattering(surface, -ray.direction, scene.shading);
     if (scattering.black() || !scattering.is_smooth()) return false;
     const Vec3d wi = scattering.wi();
@@ -41,7 +63,7 @@ bool follow_mirrors(const PathContext& context, const FlatMirrors::Chain& chain,
     const Vec3d n = scattering.front() ? surface.n_g : -surface.n_g;
     sight.share = sight.share * mirrored_share({smooth.data(), static_cast<size_t>(count)}, n, wi);
     if (is_black(sight.share)) return false;
-    sight.by.faces[sight.by.count++] = hit.face;
+    sight.by.faces[sight.by.count++] = face;
     sight.from = surface.p;
     ++sight.bounces;
     ray = {surface.p, n * (2 * dot(n, wi)) - wi};

@@ -27,6 +27,7 @@
 #include <optional>
 
 #include "integrators/film/film_point.h"
+#include "integrators/paths/straight_way.h"
 #include "integrators/terms/shadow_edges.h"
 #include "integrators/terms/shadow_lines.h"
 #include "integrators/terms/shadow_pieces.h"
@@ -97,6 +98,8 @@ class ShadowTerm final : public Term {
   bool is_seen_again() const {
     return context_.scene.max_depth < 0 || context_.scene.max_depth > 2;
   }
+  // Lines find no vertex that sees the shadow straight through a surface.
+  bool draws_lines() const { return pieces_ && !context_.straight_ways; }
   void add_samples(const PathVertex& vertex, int samples, BoundarySink& sink) const;
   // A vertex of a path, and what of it lines may find.
   struct Viewer {
@@ -159,7 +162,7 @@ void ShadowTerm::add_samples(const PathVertex& vertex, int samples, BoundarySink
   }
   sink.cost().samples += static_cast<uint64_t>(samples);
   Viewer viewer{vertex, query_at(vertex), {}};
-  if (pieces_ && vertex.bounces == 0) {
+  if (draws_lines() && vertex.bounces == 0) {
     viewer.by_lines = lines_.vertex(vertex.surface.face, vertex.surface.p,
                                     sample_lens(context_.scene.camera, vertex.key));
   }
@@ -213,7 +216,11 @@ void ShadowTerm::add_sample(const Viewer& viewer, const ShadowDraw& draw, const 
     return;
   }
   const Vec3d way = point->target(q) - q;
-  if (is_hidden_from(context_, vertex, point->face, normalize(way), length(way), cost)) {
+  RayCount shadow;
+  const auto share = share_along(context_, ray_to(vertex, point->face, normalize(way), length(way)),
+                                 vertex.bounces + 1, shadow);
+  cost.add(shadow);
+  if (!share) {
     ++cost.occluded;
     return;
   }
@@ -224,11 +231,11 @@ void ShadowTerm::add_sample(const Viewer& viewer, const ShadowDraw& draw, const 
                     edge.id.edge.index(), edge.id.object.index(), point->face.face.index(),
                     point->face.shape.index(), density(draw, by_pieces)));
   }
-  sink.add(amount);
+  sink.add(amount * *share);
 }
 
 void ShadowTerm::sample_film(double u, const Rng& key, FilmSink& sink) const {
-  const double share = pieces_ ? ShadowLines::kShare : 0;
+  const double share = draws_lines() ? ShadowLines::kShare : 0;
   if (u < share) {
     add_line(u / share, key, sink);
   } else {
@@ -254,9 +261,10 @@ void ShadowTerm::add_seen(double u, double share, const Rng& key, FilmSink& sink
   const BoundaryForm form = sweep(edge, *point, {seen->omega, seen->distance}, scale);
   if (!sink.takes(form, key)) return;
   RayCount shadow;
-  const bool hidden = is_hidden(context_, aimed_at(*seen, point->target(q)), point->face, shadow);
+  const Ray ray = ray_to(context_.scene, aimed_at(*seen, point->target(q)), point->face);
+  const auto got = share_along(context_, ray, 0, shadow);
   sink.cost().add(shadow);
-  if (!hidden) sink.add(amount);
+  if (got) sink.add(amount * *got);
 }
 
 // The viewer q of the shadow is itself a point of a face, as the camera's ray carries it.

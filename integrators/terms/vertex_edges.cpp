@@ -35,14 +35,18 @@ void draw_edges(const EdgeSampler& sampler, const EdgeQuery& query, const Rng& k
   sampler.sample_several(query, rngs, drawn);
 }
 
-bool is_hidden_from(const PathContext& context, const PathVertex& vertex, FaceRef face,
-                    const Vec3d& omega, double distance, TermCost& cost) {
+Ray ray_to(const PathVertex& vertex, FaceRef face, const Vec3d& omega, double distance) {
   Ray ray{vertex.surface.p, omega};
   ray.start = vertex.surface.start();
   ray.end = face;
   ray.t_max = distance * (1 - 0x1p-20);  // as shadow rays end
+  return ray;
+}
+
+bool is_hidden_from(const PathContext& context, const PathVertex& vertex, FaceRef face,
+                    const Vec3d& omega, double distance, TermCost& cost) {
   cost.add(RayCount{0, 1});
-  return context.tracer.occluded(ray);
+  return context.tracer.occluded(ray_to(vertex, face, omega, distance));
 }
 
 namespace {

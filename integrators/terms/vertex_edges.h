@@ -46,6 +46,8 @@ struct EdgeDraw {
 void add_edge_point(const PathContext& context, const PathVertex& vertex, const EdgeDraw& draw,
                     BoundarySink& sink);
 
+// To a face in the unit direction omega, at that distance, as shadow rays end.
+Ray ray_to(const PathVertex& vertex, FaceRef face, const Vec3d& omega, double distance);
 // Whether something hides the face from the vertex in the unit direction omega, at that distance.
 // One shadow ray.
 bool is_hidden_from(const PathContext& context, const PathVertex& vertex, FaceRef face,

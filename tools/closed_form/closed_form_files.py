@@ -76,6 +76,9 @@ def bsdf_xml(bsdf):
     if bsdf.kind == "mirror":
         return (f'  <bsdf type="conductor" id="{bsdf.id}">\n    <rgb name="eta" value="0"/>'
                 f'<rgb name="k" value="1"/>{rgb("specular_reflectance", bsdf.reflectance)}\n  </bsdf>\n')
+    if bsdf.kind == "mask":
+        return (f'  <bsdf type="mask" id="{bsdf.id}"><float name="opacity" value="{bsdf.opacity:.9g}"/>\n'
+                f'    <bsdf type="diffuse"><rgb name="reflectance" value="0"/></bsdf>\n  </bsdf>\n')
     return (f'  <bsdf type="roughconductor" id="{bsdf.id}">\n'
             f'    <rgb name="eta" value="0"/><rgb name="k" value="1"/>\n'
             f'    <string name="distribution" value="{bsdf.kind}"/>'

@@ -33,8 +33,8 @@ class Shape:
 
 @dataclass
 class Bsdf:
-    """kind: diffuse, ggx or beckmann (roughconductor with eta 0, k 1, so Fresnel = 1), or mirror (a
-    conductor with these).
+    """kind: diffuse, ggx or beckmann (roughconductor with eta 0, k 1, so Fresnel = 1), mirror (a
+    conductor with these), or mask, of a black surface.
 
     colors: 2 by 3, of a checkerboard in the place of the reflectance; its squares are halves of uv.
     """
@@ -44,6 +44,7 @@ class Bsdf:
     reflectance: np.ndarray = None
     alpha: float = 0.0
     colors: np.ndarray = None
+    opacity: float = 0.0
 
 
 @dataclass
@@ -151,7 +152,7 @@ def moved(scene, name, step):
         move_camera(scene.camera, what, axis, step)
     elif owner in scene.lights:
         move_light(scene.lights[owner], what, axis, step)
-    elif what in ("reflectance", "specular_reflectance", "alpha"):
+    elif what in ("reflectance", "specular_reflectance", "alpha", "opacity"):
         bsdf = next(s.bsdf for s in scene.shapes.values() if s.bsdf and s.bsdf.id == owner)
         if rest:  # color0 or color1
             bsdf.colors[int(rest[0][-1])] += step

@@ -99,9 +99,17 @@ class LampInMirror(FloorModel):
     """A lamp over a diffuse plane, which sees it also in the flat shape "mirror" of reflectance R:
     L = rho / pi L_e (n.Phi(lamp) + R n.Phi(the lamp's image cut by the mirror as p sees it))."""
 
+    window = "mirror"
+
+    def image_of(self, lamp, window):
+        return mirrored(lamp, window)[::-1]
+
+    def share(self, shade):
+        return shade.shapes["mirror"].bsdf.reflectance
+
     def radiance(self, shade, outline, p, viewer, order):
-        lamp, window = lamp_loop(outline, p), outline.shapes["mirror"].face(0)
-        image = mirrored(lamp, window)[::-1]
+        lamp, window = lamp_loop(outline, p), outline.shapes[self.window].face(0)
+        image = self.image_of(lamp, window)
         phi, patterns = np.zeros_like(p), set()
         for k, point in enumerate(p):
             seen, pattern = image, []
@@ -113,11 +121,24 @@ class LampInMirror(FloorModel):
             patterns.add((len(seen), *pattern))
             phi[k] = polygon_vector(point[None], seen)[0]
         assert len(patterns) == 1, "the clipped image changes within a pixel"
-        share = shade.shapes["mirror"].bsdf.reflectance
+        share = self.share(shade)
         irradiance = (polygon_vector(p, lamp) @ floor_normal(shade))[:, None]
         irradiance = irradiance + (phi @ floor_normal(shade))[:, None] * share
         return (irradiance * shade.shapes["lamp"].radiance
                 * shade.shapes["floor"].bsdf.reflectance / np.pi)
+
+
+class LampBehindMask(LampInMirror):
+    """A lamp over a diffuse plane, partly behind the flat shape "mask" of opacity o:
+    L = rho / pi L_e (n.Phi(lamp) - o n.Phi(the lamp cut by the mask as p sees it))."""
+
+    window = "mask"
+
+    def image_of(self, lamp, window):
+        return lamp
+
+    def share(self, shade):
+        return -shade.shapes["mask"].bsdf.opacity
 
 
 def faces_before(shape, eye, loop):
@@ -399,6 +420,31 @@ class LampsInMirror:
             return (sky + (share - 1) * sky * cover(mirror, at)
                     + share * (shade.shapes["near"].radiance - sky) * cover(near, at)
                     + share * (shade.shapes["far"].radiance - sky) * shown)
+
+        return pixels(camera, mean)
+
+
+class LampsBehindMask:
+    """LampsInView, a part of it behind the flat shape "mask" of opacity o: with c(m) what the mask
+    covers, I - o (I restricted to m)."""
+
+    outlines_in_view = True
+
+    def image(self, domain, shade, outline, shadow, order):
+        camera, sky, shapes = domain.camera, shade.environment, domain.shapes
+        mask, near, far = (film_loop(domain, shapes[name].face(0))
+                           for name in ("mask", "near", "far"))
+        cover, opacity = Filter(camera.filter).over_polygon, shade.shapes["mask"].bsdf.opacity
+
+        def share(loop, at):
+            return cover(loop, at) - opacity * cover(clip_convex(loop, mask), at)
+
+        def mean(corner):
+            at = corner + 0.5
+            shown = share(far, at) - share(clip_convex(far, near), at)
+            return (sky * (1 - opacity * cover(mask, at))
+                    + (shade.shapes["near"].radiance - sky) * share(near, at)
+                    + (shade.shapes["far"].radiance - sky) * shown)
 
         return pixels(camera, mean)
 

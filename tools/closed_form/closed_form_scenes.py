@@ -151,6 +151,27 @@ def lamps_in_view(kind):
     return scene, models.LampsInView(), names
 
 
+def lamps_behind_mask():
+    """A veil before a part of both."""
+    scene, _, names = lamps_in_view("box")
+    mask = parallelogram((-0.15625, -1.0625, -0.96875), (-0.03125, 1, 0.125), (1.09375, 0.25, -0.21875))
+    mask.bsdf = Bsdf("mask_bsdf", "mask", opacity=0.375)
+    scene.name, scene.max_depth, scene.shapes = "lamps_behind_mask.xml", 2, {
+        "mask": mask, **scene.shapes}
+    return scene, models.LampsBehindMask(), names + moves_of("mask") + ["mask_bsdf.opacity"]
+
+
+def lamp_behind_mask():
+    """The floor sees a part of the lamp through a veil."""
+    mask = parallelogram((0, 0.625, 0.0625), (0.0625, 0.0625, 0.75), (0.75, 0.25, 0.125))
+    scene, _, names = lamp_in_mirror()
+    mask.bsdf = Bsdf("mask_bsdf", "mask", opacity=0.375)
+    scene.name = "lamp_behind_mask.xml"
+    scene.shapes = {"floor": scene.shapes["floor"], "mask": mask, "lamp": scene.shapes["lamp"]}
+    names = moves_of("mask") + [n for n in names if not n.startswith("mirror")]
+    return scene, models.LampBehindMask(), names + ["mask_bsdf.opacity"]
+
+
 def square_in_mirror():
     """Two lamps behind the camera, in a flat mirror in front of it that shows a part of one."""
     camera = Camera(vector(0.625, 0.625, -3.9375), vector(0.375, 0.1875, -0.1875), vector(0, 1, 0),
@@ -363,6 +384,8 @@ SCENES = {
     "lamps_in_view_gaussian": lambda: lamps_in_view("gaussian"),
     "square_in_mirror": square_in_mirror,
     "lamp_in_mirror": lamp_in_mirror,
+    "lamps_behind_mask": lamps_behind_mask,
+    "lamp_behind_mask": lamp_behind_mask,
     "crossing_in_view": crossing_in_view,
     "crossing_over_plane": crossing_over_plane,
     "lamp_in_ggx": lambda: lamp_in_gloss("ggx", 0.1),
