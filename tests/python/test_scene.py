@@ -110,9 +110,26 @@ def test_parameters_are_a_mapping(scene):
     assert (fov.name, fov.unit, fov.shape, fov.value) == ("sensor.fov", "degrees", (), 40)
     assert fov.natural_step == pytest.approx(0.4)
     assert parameters["tent.vertex_positions"].shape == (6, 3)
-    assert parameters["tent.translate.x"].value is None
+    assert parameters["tent.rotate.x"].value is None
     parameter = limn.load_string(SCENE.replace("tent.obj", scene.file.replace("scene.xml", "tent.obj"))).parameters["lamp.radiance"]
     assert parameter.value.tolist() == [4, 5, 6]  # its scene is gone
+
+
+# Where the file has it is 0.
+def test_translations_have_a_value(scene):
+    name, before = "tent.translate.x", scene["tent.vertex_positions"]
+    assert scene[name] == 0 and scene.parameters[name].value == 0
+    scene.move(name, 0.25)
+    other = scene.copy()
+    scene[name] = 1.5
+    assert (scene[name], other[name], scene["tent.translate.y"]) == (1.5, 0.25, 0)
+    assert np.array_equal(scene["tent.vertex_positions"] - before, np.tile([1.5, 0, 0], (6, 1)))
+    with pytest.raises(limn.InputError):
+        scene[name] = np.inf
+    assert scene[name] == 1.5
+    fit = limn.Fit(other, limn.render(other, spp=2).value, name, spp=2)
+    fit.run(2)
+    assert fit.scenes[0][name] == 0.25 + fit.values[name] != 0.25
 
 
 def test_every_value_comes_back(scene):

@@ -42,9 +42,15 @@ class SceneHandle {
     return *scene_;
   }
 
+  // How far translations have moved since the scene was read [scene units], by name.
+  std::map<std::string, double> moved;
+
  private:
   std::shared_ptr<Scene> scene_;
 };
+
+// Does a parameter of this name move something along an axis?
+bool is_translation(const std::string& name);
 
 // Each group adds its names to the module.
 nb::class_<SceneHandle> bind_scene(nb::module_& m);

@@ -18,6 +18,7 @@ namespace {
 struct FitHandle {
   Fit fit;
   std::vector<FitRecord> history;
+  std::vector<std::map<std::string, double>> moved;  // SceneHandle's, of each view at the start
   bool busy = false;  // with a step, which lets others have the GIL; used with the GIL held
 
   // InputError during a step.
@@ -73,6 +74,13 @@ struct FitCall {
     a.add_former("sampler", "method");
   }
 
+  // SceneHandle's, of each view.
+  std::vector<std::map<std::string, double>> moved() const {
+    std::vector<std::map<std::string, double>> all{scene->moved};
+    for (nb::handle view : views) all.push_back(nb::cast<const SceneHandle&>(view[0]).moved);
+    return all;
+  }
+
   Fit make(const Arguments& given) {
     given.refuse_samples(options.backward.points, {"spp"});
     for (const auto& [name, range] : bounds) {
@@ -112,8 +120,13 @@ FitRecord step(FitHandle& handle, const nb::object& progress) {
 nb::list scenes_of(const FitHandle& h) {
   h.check_idle();
   nb::list scenes;
-  for (const FitView& view : h.fit.views()) {
-    scenes.append(nb::cast(SceneHandle(deep_copy(view.scene))));
+  for (size_t i = 0; i < h.fit.views().size(); ++i) {
+    SceneHandle scene(deep_copy(h.fit.views()[i].scene));
+    scene.moved = h.moved[i];
+    for (const FitScalar& s : h.fit.scalars()) {
+      if (is_translation(s.parameter)) scene.moved[s.parameter] += s.value;
+    }
+    scenes.append(nb::cast(std::move(scene)));
   }
   return scenes;
 }
@@ -210,7 +223,8 @@ void bind_fit(nb::module_& m) {
             Arguments given("Fit");
             call.take(given);
             given.read(positional, named);
-            new (self) FitHandle{call.make(given), {}, false};
+            Fit fit = call.make(given);
+            new (self) FitHandle{std::move(fit), {}, call.moved(), false};
           },
           nb::sig(arguments.method_signature("__init__", "None").c_str()),
           ("Copies the scene; it stays as it is.\n\n" + arguments.documentation()).c_str())

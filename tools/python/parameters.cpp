@@ -14,6 +14,7 @@ namespace {
 struct ParameterView {
   std::shared_ptr<const Scene> scene;
   Parameter parameter;
+  std::optional<double> moved;  // of a translation
 };
 
 // All of a scene, as it is.
@@ -22,7 +23,12 @@ struct ParametersView {
 };
 
 ParameterView find(const SceneHandle& scene, const std::string& name) {
-  return {scene.share(), find_parameter_or_array(scene.get(), name)};
+  ParameterView view{scene.share(), find_parameter_or_array(scene.get(), name), std::nullopt};
+  if (!is_translation(view.parameter.name)) return view;
+  if (!view.parameter.value(*view.scene).empty()) return view;  // a place, as the camera's
+  const auto moved = scene.moved.find(view.parameter.name);
+  view.moved = moved == scene.moved.end() ? 0 : moved->second;
+  return view;
 }
 
 // The shape whose positions the parameter is; none of another parameter.
@@ -33,6 +39,7 @@ std::optional<ShapeId> shape_of(const ParameterView& view) {
 }
 
 nb::object value_of(const ParameterView& view) {
+  if (view.moved) return nb::cast(*view.moved);
   if (const auto shape = shape_of(view)) return nb::cast(view_positions(view.scene, *shape));
   if (view.parameter.array.size() == 3) {
     return nb::cast(to_array(view.scene->environment->texels()));
@@ -66,10 +73,17 @@ void assign(SceneHandle& scene, const std::string& name, nb::handle value) {
       as_array(value, "float64"));
   std::vector<double> numbers(array.data(), array.data() + array.size());
   Parameter parameter;
+  std::optional<double> moved;
   {
     const ParameterView view = find(scene, name);
+    moved = view.moved;
     check_shape(view, nb::ndarray<const double, nb::c_contig>(array));
     parameter = view.parameter;
+  }
+  if (moved && numbers.size() == 1) {
+    parameter.move_checked(scene.edit(), numbers[0] - *moved);
+    scene.moved[parameter.name] = numbers[0];
+    return;
   }
   std::vector<std::string> warnings;
   parameter.assign(scene.edit(), numbers, &warnings);
@@ -110,8 +124,8 @@ void bind_parameter(nb::module_& m) {
           "A small step: about a hundredth of what changes the picture a lot.")
       .def_prop_ro("value", value_of, nb::sig("def value(self) -> float | numpy.ndarray | None"),
                    "The value: a number, float64 (3,) of a colour, or float32 (V, 3), a view that "
-                   "cannot be written; a float32 (H, W, 3) copy of texels. None for what only "
-                   "moves things from where they are "
+                   "cannot be written; a float32 (H, W, 3) copy of texels. Of a translation how "
+                   "far it has been moved since the scene was read. None of rotations and scales "
                    "(Scene.move).")
       .def("__repr__", repr);
 }
@@ -161,6 +175,13 @@ void bind_mapping(nb::module_& m) {
 }
 
 }  // namespace
+
+bool is_translation(const std::string& name) {
+  for (const char* end : {".translate.x", ".translate.y", ".translate.z"}) {
+    if (name.ends_with(end)) return true;
+  }
+  return false;
+}
 
 void bind_parameters(nb::module_& m, nb::class_<SceneHandle>& scene) {
   bind_parameter(m);

@@ -15,6 +15,10 @@ _MOTION = re.compile(r"\.(scale|(rotate|translate)\.[xyz])$")
 _ORDER = {"scale": 0, "rotate": 1, "translate": 2}
 
 
+def _moves_shape(scene: Scene, name: str) -> bool:
+    return ".translate." in name and name.rsplit(".", 2)[0] in scene.shapes
+
+
 def per_number(slope: Any, shape: tuple[int, ...]) -> Any:
     """A derivative in the shape of what was given: one number sets all channels of a colour."""
     slope = np.asarray(slope)
@@ -27,7 +31,7 @@ def _center(scene: Scene, shape: str) -> Any:
 
 
 class Motions:
-    """What is given for the parameters of a scene: values, and steps of motions without a value.
+    """What is given for the parameters of a scene: values, and steps of motions.
 
     A shape is scaled by 1 + s about the center c of its bounds, turned about an axis through c, then
     translated by t: p = c + t + (1 + s) R (p0 - c). In the moved scene limn's
@@ -39,13 +43,14 @@ class Motions:
         self.numbers = dict(numbers)
         self.steps: dict[str, float] = {}
         for name, value in self.numbers.items():
-            if scene[name] is not None:
+            start: Any = scene[name]
+            if start is not None and not _moves_shape(scene, name):
                 continue
             if scene.parameters[name].shape != () or not _MOTION.search(name):
                 raise InputError(f'parameter "{name}" has no value to give')
             if value.size != 1:
                 raise InputError(f'parameter "{name}" takes one number, not {value.shape}')
-            self.steps[name] = float(value.reshape(()))
+            self.steps[name] = float(value.reshape(())) - (start or 0.0)
         self.centers = {s: _center(scene, s) for s in scene.shapes if self._of(s)}
         self._check()
 

@@ -104,9 +104,9 @@ def render(
 
     values: tensors of the shapes that scene[name] has, of any real dtype and on any device (the
     image is on the CPU); one number sets all channels of a colour. The scene itself stays as it is.
-    Of a parameter without a value (motions of a shape, rotations) it is the step by which it moves
-    from where the scene has it; a shape is scaled first, then turned about its center, about one
-    axis, then translated.
+    Of a parameter without a value (rotations, scales) it is the step by which it moves from where
+    the scene has it; a shape is scaled first, then turned about its center, about one axis, then
+    translated.
     spp, spp_grad: samples per pixel of the image and of its gradient; None: spp_grad as spp, spp as
     the scene says. The image has the seed 2 * seed, the gradient 2 * seed + 1: both are independent,
     so that the gradient is unbiased where the loss is linear in the image. For a squared difference
