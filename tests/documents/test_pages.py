@@ -9,7 +9,7 @@ import unittest
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 WIDTH = 100
-MOST_PICTURE_BYTES = 300_000
+MOST_PICTURE_BYTES = 3_000_000
 MOST_WORDS = 20_000  # of all pages together, as wc -w counts them
 MOST_LINES = 150  # of a page
 # Words for which the field has its own, each with the field's (some are names in code, which may

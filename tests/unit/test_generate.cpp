@@ -142,6 +142,17 @@ TEST_P(GeneratedMesh, DoesNotCrossItself) {
   EXPECT_TRUE(find_intersections(meshes, find_face_pairs(meshes, {}, 1), 1).empty());
 }
 
+TEST_P(GeneratedMesh, WritesTextureCoordinatesAndColours) {
+  const TempFiles files;
+  write_triangles(files.path("mesh.ply"), mesh_);
+  const std::string bytes = bytes_of(files.path("mesh.ply"));
+  EXPECT_EQ(bytes.find("float v\n") != std::string::npos, !mesh_.uv.empty());
+  EXPECT_EQ(bytes.find("float b\n") != std::string::npos, !mesh_.colours.empty());
+  for (const size_t count : {mesh_.uv.size(), mesh_.colours.size()}) {
+    EXPECT_TRUE(count == 0 || count == mesh_.positions.size());
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(, GeneratedMesh, testing::ValuesIn(cases()), [](const auto& test) {
   return std::string(test.param.kind.name) + "_" + std::to_string(test.param.faces);
 });
@@ -171,12 +182,21 @@ TEST(Bracket, HasSharpEdgesAndFlatSides) {
 }
 
 TEST(GeneratedSkies, ArePositiveAndFitIntoHalfFloats) {
-  for (const SkyKind& kind : sky_kinds()) {
+  for (const ImageKind& kind : sky_kinds()) {
     const Image image = kind.make();
     EXPECT_EQ(image.width, 2 * image.height) << kind.name;
     const auto [least, most] = std::ranges::minmax(image.data);
     EXPECT_GT(least, 0) << kind.name;
     EXPECT_LT(most, 65504) << kind.name;
+  }
+}
+
+TEST(GeneratedTextures, AreReflectances) {
+  for (const ImageKind& kind : texture_kinds()) {
+    const Image image = kind.make();
+    const auto [least, most] = std::ranges::minmax(image.data);
+    EXPECT_GT(least, 0) << kind.name;
+    EXPECT_LT(most, 1) << kind.name;
   }
 }
 

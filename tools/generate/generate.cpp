@@ -1,4 +1,4 @@
-// limn_generate: writes the meshes and skies that scenes/ uses.
+// limn_generate: writes the meshes, skies and textures that scenes/ uses.
 #include "tools/generate/generate.h"
 
 #include <fmt/format.h>
@@ -24,7 +24,13 @@ void list() {
                kind.fewest_faces, kind.description);
   }
   fmt::print("skies (EXR):\n");
-  for (const SkyKind& kind : sky_kinds()) fmt::print("  {:<12} {}\n", kind.name, kind.description);
+  for (const ImageKind& kind : sky_kinds()) {
+    fmt::print("  {:<12} {}\n", kind.name, kind.description);
+  }
+  fmt::print("textures (PNG or EXR):\n");
+  for (const ImageKind& kind : texture_kinds()) {
+    fmt::print("  {:<12} {}\n", kind.name, kind.description);
+  }
 }
 
 void write_mesh(const MeshKind& kind, int faces, const std::string& file) {
@@ -37,9 +43,13 @@ void write_mesh(const MeshKind& kind, int faces, const std::string& file) {
   fmt::print("{}: {} faces, {} vertices\n", file, mesh.faces.size(), mesh.positions.size());
 }
 
-void write_sky(const SkyKind& kind, const std::string& file) {
+void write_image(const ImageKind& kind, const std::string& file) {
   const Image image = kind.make();
-  write_exr(file, image, true, {});
+  if (file.ends_with(".png")) {
+    write_png(file, image, 1);
+  } else {
+    write_exr(file, image, true, {});
+  }
   fmt::print("{}: {} x {}\n", file, image.width, image.height);
 }
 
@@ -49,8 +59,11 @@ void write_all(const std::string& folder, int faces) {
     const int count = faces > 0 ? std::max(faces, kind.fewest_faces) : kind.default_faces;
     write_mesh(kind, count, fmt::format("{}/{}.ply", folder, kind.name));
   }
-  for (const SkyKind& kind : sky_kinds()) {
-    write_sky(kind, fmt::format("{}/{}.exr", folder, kind.name));
+  for (const ImageKind& kind : sky_kinds()) {
+    write_image(kind, fmt::format("{}/{}.exr", folder, kind.name));
+  }
+  for (const ImageKind& kind : texture_kinds()) {
+    write_image(kind, fmt::format("{}/{}.png", folder, kind.name));
   }
 }
 
@@ -58,21 +71,28 @@ void write_one(const Options& options) {
   const auto named = [&](const auto& kind) { return kind.name == options.name; };
   const auto meshes = mesh_kinds();
   const auto skies = sky_kinds();
+  const auto textures = texture_kinds();
   if (const auto kind = std::ranges::find_if(meshes, named); kind != meshes.end()) {
     write_mesh(*kind, options.faces > 0 ? options.faces : kind->default_faces, options.file);
   } else if (const auto sky = std::ranges::find_if(skies, named); sky != skies.end()) {
     if (options.faces > 0) throw InputError(options.name + " is a sky: it takes no --faces");
-    write_sky(*sky, options.file);
+    write_image(*sky, options.file);
+  } else if (const auto texture = std::ranges::find_if(textures, named);
+             texture != textures.end()) {
+    if (options.faces > 0) throw InputError(options.name + " is a texture: it takes no --faces");
+    write_image(*texture, options.file);
   } else {
     throw InputError("nothing is called \"" + options.name + "\"; limn_generate --list shows all");
   }
 }
 
 int run(int argc, char** argv) {
-  CLI::App app("Writes the meshes and skies that the scenes use, the same bytes every time.");
+  CLI::App app(
+      "Writes the meshes, skies and textures that the scenes use, the same bytes every time.");
   Options options;
   app.add_option("NAME", options.name, "what to make, see --list");
-  app.add_option("FILE", options.file, "a mesh: .ply or .obj; a sky: .exr");
+  app.add_option("FILE", options.file,
+                 "a mesh: .ply or .obj; a sky: .exr; a texture: .png or .exr");
   app.add_option("--faces", options.faces, "about how many triangles")
       ->check(CLI::Range(1, kMostFaces));
   app.add_option("--all", options.all, "write everything into this folder");

@@ -1,5 +1,7 @@
 #pragma once
-// Meshes and skies made by formula: the same bytes every time, for scenes, tests and the demo.
+// Meshes, skies and textures made by formula: the same bytes every time, for scenes, tests and
+// the demo.
+#include <array>
 #include <span>
 #include <string>
 #include <vector>
@@ -11,8 +13,10 @@ namespace limn {
 
 // Vertices are shared: positions that coincide are one vertex.
 struct Triangles {
-  std::vector<Vec3d> positions;    // V
-  std::vector<FaceIndices> faces;  // F, counter-clockwise from outside
+  std::vector<Vec3d> positions;           // V
+  std::vector<FaceIndices> faces;         // F, counter-clockwise from outside
+  std::vector<std::array<double, 2>> uv;  // V texture coordinates, or none
+  std::vector<Rgb<double>> colours;       // V linear reflectances, or none
 };
 
 // What a mesh is, at every size; tests/unit/test_generate.cpp holds it to this.
@@ -28,21 +32,22 @@ struct MeshKind {
 };
 inline constexpr int kMostFaces = 500000;
 
-struct SkyKind {
+struct ImageKind {
   const char* name;
   const char* description;
-  Image (*make)();  // of a map as the emitter `envmap` reads it, +y up
+  Image (*make)();
 };
 
 std::span<const MeshKind> mesh_kinds();
-std::span<const SkyKind> sky_kinds();
+std::span<const ImageKind> sky_kinds();      // maps as the emitter `envmap` reads them, +y up
+std::span<const ImageKind> texture_kinds();  // linear reflectances in [0, 1]
 
 // A mesh as the scenes expect it: the longest side of its bounds is 1.98, centered in x and z, the
 // lowest point at y = -0.99 (where the Stanford bunny of glmark2-data has its feet).
 Triangles make_mesh(const MeshKind& kind, int faces);
 
-// FILE.ply (binary) or FILE.obj, without normals. InputError for other endings and for files that
-// cannot be written.
+// FILE.ply (binary, with texture coordinates and colours) or FILE.obj (positions alone), without
+// normals. InputError for other endings and for files that cannot be written.
 void write_triangles(const std::string& file, const Triangles& mesh);
 
 }  // namespace limn

@@ -20,11 +20,11 @@ constexpr double kColumn = 0.1;  // the arms start outside the column's widest p
 
 Triangles candle_set(const Vec3d& top, double h) {
   Triangles mesh =
-      smooth_lathe({{0, 0.012}, {0.05, 0.014}, {0.085, 0.045}, {0.05, 0.03}, {0, 0.026}}, h);
+      smooth_lathe({{0, 0.012}, {0.05, 0.014}, {0.085, 0.045}, {0.05, 0.03}, {0, 0.026}}, h, 8);
   append(mesh,
-         smooth_lathe({{0, 0.045}, {0.024, 0.05}, {0.022, 0.1}, {0.022, 0.17}, {0, 0.182}}, h));
+         smooth_lathe({{0, 0.045}, {0.024, 0.05}, {0.022, 0.1}, {0.022, 0.17}, {0, 0.182}}, h, 8));
   append(mesh,
-         smooth_lathe({{0, 0.19}, {0.017, 0.205}, {0.02, 0.235}, {0.008, 0.27}, {0, 0.29}}, h));
+         smooth_lathe({{0, 0.19}, {0.017, 0.205}, {0.02, 0.235}, {0.008, 0.27}, {0, 0.29}}, h, 8));
   return moved(mesh, top);
 }
 
@@ -34,7 +34,7 @@ Triangles drop(const Vec3d& top, double size, double h) {
                              {0.28 * size, -0.6 * size},
                              {0.09 * size, -0.2 * size},
                              {0, 0}},
-                            h),
+                            h, 8),
                top);
 }
 
@@ -89,7 +89,7 @@ Triangles chandelier(double h) {
                                  {0.05, 0.6},
                                  {0.02, 0.7},
                                  {0, 0.72}},
-                                h);
+                                h, 8);
   append(mesh, drop({0, -0.635, 0}, 0.2, h));
   for (const Tier& tier : {Tier{12, 0.92, 0.0, -0.15, 0}, Tier{8, 0.56, 0.44, 0.3, 0.5}}) {
     Triangles sector = arm(tier, h);

@@ -31,14 +31,34 @@ std::span<const MeshKind> mesh_kinds() {
        make_gear},
       {"pinion", "8 teeth and a bore, about the z axis", 1500, 1000, true, 1, 1, make_pinion},
       {"ball", "a sphere of few faces, nearly alike", 320, 80, true, 1, 0, make_ball},
+      {"vase", "a bellied vase", 20000, 2000, true, 1, 0, make_vase},
+      {"bowl", "a wide bowl", 20000, 2000, true, 1, 0, make_bowl},
+      {"goblet", "a wine glass with a thin wall", 40000, 8000, true, 1, 0, make_goblet},
+      {"bottle", "an open bottle", 30000, 4000, true, 1, 0, make_bottle},
+      {"orange", "an orange, with colours", 30000, 1000, true, 1, 0, make_orange},
+      {"lemon", "a lemon that stands, with colours", 20000, 1000, true, 1, 0, make_lemon},
+      {"pear", "a pear, with colours", 20000, 1000, true, 1, 0, make_pear},
+      {"grapes", "a heap of grapes", 30000, 5000, true, 34, 0, make_grapes},
+      {"twigs", "six twigs with oval open leaves", 20000, 5000, false, 114, 0, make_twigs},
+      {"cloth", "a cloth with folds that hangs over a table's edge, with texture coordinates",
+       40000, 2000, false, 1, 0, make_cloth},
+      {"word", "the letters of limn, for face_normals", 4500, 1100, true, 5, 0, make_word},
   };
   return kinds;
 }
 
-std::span<const SkyKind> sky_kinds() {
-  static const SkyKind kinds[] = {
+std::span<const ImageKind> sky_kinds() {
+  static const ImageKind kinds[] = {
       {"sky_soft", "clouds, lit from one side", make_soft_sky},
       {"sky_sun", "clear, with a strong small sun", make_sun_sky},
+  };
+  return kinds;
+}
+
+std::span<const ImageKind> texture_kinds() {
+  static const ImageKind kinds[] = {
+      {"boards", "a table's boards", make_boards},
+      {"linen", "woven linen with checks", make_linen},
   };
   return kinds;
 }
@@ -69,13 +89,22 @@ void put(std::string& bytes, T number) {
 }
 
 std::string ply_bytes(const Triangles& mesh) {
-  std::string bytes = fmt::format(
-      "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\n"
-      "property float y\nproperty float z\nelement face {}\n"
-      "property list uchar int vertex_indices\nend_header\n",
-      mesh.positions.size(), mesh.faces.size());
-  for (const Vec3d& p : mesh.positions) {
-    for (int i = 0; i < 3; ++i) put(bytes, static_cast<float>(p[i]));
+  std::string names = "xyz";
+  if (!mesh.uv.empty()) names += "uv";
+  if (!mesh.colours.empty()) names += "rgb";
+  std::string bytes = fmt::format("ply\nformat binary_little_endian 1.0\nelement vertex {}\n",
+                                  mesh.positions.size());
+  for (const char name : names) bytes += fmt::format("property float {}\n", name);
+  bytes += fmt::format("element face {}\nproperty list uchar int vertex_indices\nend_header\n",
+                       mesh.faces.size());
+  for (size_t v = 0; v < mesh.positions.size(); ++v) {
+    for (int i = 0; i < 3; ++i) put(bytes, static_cast<float>(mesh.positions[v][i]));
+    if (!mesh.uv.empty()) {
+      for (const double x : mesh.uv[v]) put(bytes, static_cast<float>(x));
+    }
+    if (!mesh.colours.empty()) {
+      for (int i = 0; i < 3; ++i) put(bytes, static_cast<float>(mesh.colours[v][i]));
+    }
   }
   for (const FaceIndices& face : mesh.faces) {
     put(bytes, uint8_t{3});

@@ -182,18 +182,18 @@ Triangles lathe(const std::vector<std::pair<double, double>>& profile, double h)
   return sweep(rings, sides);
 }
 
-Triangles smooth_lathe(const std::vector<std::pair<double, double>>& profile, double h) {
+Triangles smooth_lathe(const std::vector<std::pair<double, double>>& profile, double h, int sides) {
   std::vector<Vec3d> points;
   for (const auto& [r, y] : profile) points.push_back({r, y, 0});
   const double size = arc_length([&](double t) { return spline(points, t); });
   const int pieces = steps(size, h, 2 * static_cast<int>(points.size()));
-  std::vector<std::pair<double, double>> fine = {{0, profile.front().second}};
+  std::vector<Ring> rings = {{{0, profile.front().second, 0}, {0, 1, 0}, 0}};
   for (int i = 1; i < pieces; ++i) {
     const Vec3d p = spline(points, static_cast<double>(i) / pieces);
-    fine.emplace_back(p.x, p.y);
+    rings.push_back({{0, p.y, 0}, {0, 1, 0}, p.x});
   }
-  fine.emplace_back(0, profile.back().second);
-  return lathe(fine, 1e9);
+  rings.push_back({{0, profile.back().second, 0}, {0, 1, 0}, 0});
+  return sweep(rings, sides);
 }
 
 Triangles ellipsoid(const Vec3d& center, const Vec3d& radii, double h) {
@@ -224,6 +224,40 @@ Triangles torus(const Vec3d& center, const Vec3d& axis, double radius, double tu
                      frame.t * std::cos(a) - frame.s * std::sin(a), tube_radius});
   }
   return closed_sweep(rings, steps(2 * kPi * tube_radius, h, 6));
+}
+
+namespace {
+
+// A random number in [-1, 1] for a point of the lattice: the finalizer of SplitMix64 over its
+// coordinates.
+double lattice_number(int64_t x, int64_t y, int64_t z) {
+  uint64_t bits = static_cast<uint64_t>(x) * 0x9e3779b97f4a7c15u +
+                  static_cast<uint64_t>(y) * 0xc2b2ae3d27d4eb4fu +
+                  static_cast<uint64_t>(z) * 0x165667b19e3779f9u;
+  bits = (bits ^ (bits >> 30)) * 0xbf58476d1ce4e5b9u;
+  bits = (bits ^ (bits >> 27)) * 0x94d049bb133111ebu;
+  bits ^= bits >> 31;
+  return static_cast<double>(bits >> 11) / static_cast<double>(uint64_t{1} << 52) - 1;
+}
+
+}  // namespace
+
+double noise(const Vec3d& p) {
+  const Vec3d cell{std::floor(p.x), std::floor(p.y), std::floor(p.z)};
+  double sum = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    double weight = 1;
+    int64_t at[3];
+    for (int k = 0; k < 3; ++k) {
+      const double t = p[k] - cell[k];
+      const double s = t * t * (3 - 2 * t);
+      const int up = corner >> k & 1;
+      weight *= up != 0 ? s : 1 - s;
+      at[k] = static_cast<int64_t>(cell[k]) + up;
+    }
+    sum += weight * lattice_number(at[0], at[1], at[2]);
+  }
+  return sum;
 }
 
 Triangles moved(Triangles mesh, const Vec3d& offset) {

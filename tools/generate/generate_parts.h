@@ -46,8 +46,8 @@ Triangles rod(const Vec3d& from, const Vec3d& to, double radius, double h);
 // A surface of revolution around the y axis: (r, y) from the lowest point (0, y) to the highest, a
 // polyline whose corners stay; edges are about h long.
 Triangles lathe(const std::vector<std::pair<double, double>>& profile, double h);
-// The same with the corners rounded off, as a spline of the points.
-Triangles smooth_lathe(const std::vector<std::pair<double, double>>& profile, double h);
+// The same with the corners rounded off, as a spline of the points, and any number of sides.
+Triangles smooth_lathe(const std::vector<std::pair<double, double>>& profile, double h, int sides);
 Triangles ellipsoid(const Vec3d& center, const Vec3d& radii, double h);
 Triangles torus(const Vec3d& center, const Vec3d& axis, double radius, double tube_radius,
                 double h);
@@ -60,6 +60,9 @@ Vec3d turned(const Vec3d& p, double angle);
 // A point of the Catmull-Rom spline through the points, t in [0, 1].
 Vec3d spline(const std::vector<Vec3d>& points, double t);
 double arc_length(const std::function<Vec3d(double)>& position);
+
+// Value noise: random numbers at the points of the integer lattice, smooth in between, in [-1, 1].
+double noise(const Vec3d& p);
 
 // As many steps as `h` fits into `length`, but at least `fewest`.
 int steps(double length, double h, int fewest);

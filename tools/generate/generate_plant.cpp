@@ -69,7 +69,7 @@ Triangles plant(double h) {
                                  {0.34, -0.02},
                                  {0.2, -0.03},
                                  {0, -0.025}},
-                                h);
+                                h, 8);
   for (int i = 0; i < kLeaves; ++i) {
     const Growth g = growth(i);
     append(mesh, turned(tube({[&](double t) { return spline(g.stem, t); },

@@ -92,6 +92,8 @@ COMPARISONS = [
     Comparison("in-view-object", "all in view, moving object", "in_view", ASIDE, [], True, WIDE),
     Comparison("cad", "CAD part, sharp edges", "cad", TURN, [], False, WIDE),
     Comparison("plant", "plant, open leaves", "plant", TURN),
+    # What its glass shows by smooth refraction has edges that no term has.
+    Comparison("still-life", "", "still_life", ASIDE, [], False, WIDE),
     Comparison("demo", "demo (bunny)", "demo", UP, [], False, {"needs": BUNNY}),
 ]
 ABLATED = [comparison for comparison in COMPARISONS if comparison.title]
