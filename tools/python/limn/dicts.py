@@ -33,6 +33,8 @@ TYPES = {
              "roughdielectric", "roughplastic", "thindielectric", "twosided"],
     "emitter": ["area", "constant", "directional", "envmap", "point", "projector",
                 "spot"],
+    "texture": ["bitmap", "checkerboard", "mesh_attribute"],
+    "spectrum": ["blackbody", "d65", "irregular", "rawconstant", "regular", "srgb", "uniform"],
 }
 _TAGS = {type_: tag for tag, types in TYPES.items() for type_ in types}
 # What has parameters to be named.
@@ -134,6 +136,8 @@ class _Writer:
             raise InputError(f'{place}: error: unknown type "{kind}" (known: {known})')
         tag = _TAGS[kind]
         attributes = {"type": kind}
+        if tag in ("spectrum", "texture"):
+            attributes["name"] = name
         if tag in _NAMED:
             own = what.get("id", place.removeprefix("dict."))
             attributes["id"] = _checked(f"{place}.id", own)
