@@ -1,5 +1,6 @@
 // The diffuse (Lambertian) BSDF; its back is black.
 #include <algorithm>
+#include <limits>
 
 #include "src/bsdf/cosine.h"
 #include "src/bsdf/types.h"
@@ -83,7 +84,9 @@ std::shared_ptr<Bsdf> make_diffuse(const ConstantOrTexture& reflectance) {
 }
 
 std::shared_ptr<Bsdf> read_diffuse(Properties& properties) {
-  return make_diffuse(read_reflectance(properties, "reflectance", 0.5));
+  // Mitsuba takes brighter texels with a warning, too, which the reader of the scene gives.
+  return make_diffuse(
+      read_reflectance(properties, "reflectance", 0.5, std::numeric_limits<double>::max()));
 }
 
 }  // namespace limn

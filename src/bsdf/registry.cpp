@@ -59,8 +59,9 @@ std::shared_ptr<Texture> read_texture(Properties& properties, const char* name, 
   return texture;
 }
 
-ConstantOrTexture read_reflectance(Properties& properties, const char* name, double absent) {
-  if (auto texture = read_texture(properties, name, 1)) return texture;
+ConstantOrTexture read_reflectance(Properties& properties, const char* name, double absent,
+                                   double most_texel) {
+  if (auto texture = read_texture(properties, name, most_texel)) return texture;
   const Rgb<double> c = properties.rgb(name, grey(absent));
   for (int i = 0; i < 3; ++i) {
     if (!(c[i] >= 0 && c[i] <= 1)) properties.fail(name, "a reflectance must lie in [0, 1]");

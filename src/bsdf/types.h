@@ -40,7 +40,9 @@ RoughConductorValues::Distribution read_distribution(Properties& properties);
 
 // The texture of this name, whose values must lie in [0, most]; null if there is none.
 std::shared_ptr<Texture> read_texture(Properties& properties, const char* name, double most);
-// Reads a colour whose channels lie in [0, 1], as Mitsuba requires of reflectances, or a texture.
-ConstantOrTexture read_reflectance(Properties& properties, const char* name, double absent);
+// Reads a colour whose channels lie in [0, 1], as Mitsuba requires of reflectances, or a texture of
+// at most most_texel.
+ConstantOrTexture read_reflectance(Properties& properties, const char* name, double absent,
+                                   double most_texel = 1);
 
 }  // namespace limn

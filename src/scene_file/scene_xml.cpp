@@ -11,6 +11,7 @@
 #include "limn/core/mesh_attribute.h"
 #include "limn/core/names.h"
 #include "limn/core/scene.h"
+#include "src/mesh/curves.h"
 #include "src/mesh/mesh_build.h"
 #include "src/mesh/mesh_file.h"
 #include "src/mesh/shapes.h"
@@ -168,6 +169,12 @@ class SceneBuilder {
     DescribedProperties p(object, description_, make_nested_);
     std::shared_ptr<Bsdf> made = make_bsdf(p);
     p.check_all_used();
+    for (int k = 0; k < made->texture_count() && object.type == "diffuse"; ++k) {
+      if (made->texture(k).range().most > 1) {
+        warnings_.push_back(
+            format_warning(p.where("reflectance"), "the texture reflects more than it receives"));
+      }
+    }
     if (object.type == "bumpmap") {
       warnings_.push_back(format_warning(
           object.where, "bumpmap: derivatives of what moves take its normals as constants"));
@@ -235,7 +242,8 @@ class SceneBuilder {
     options = read_mesh_options(p, false);
     // Flat shapes use face normals. A mirrored flat shape keeps its outside, as in Mitsuba, which
     // transforms the normals.
-    options.face_normals = type != "sphere" && type != "cylinder";
+    const bool curves = type == "bsplinecurve" || type == "linearcurve";
+    options.face_normals = type != "sphere" && type != "cylinder" && !curves;
     if (options.face_normals && mirrors(options.to_world)) {
       options.flip_normals = !options.flip_normals;
     }
@@ -244,9 +252,11 @@ class SceneBuilder {
     if (type == "disk") return make_disk();
     if (type == "cylinder") return read_cylinder(p, options);
     if (type == "sphere") return read_sphere(p, options);
+    if (curves) return read_curves(p, options);
     throw InputError(p.where(), unknown_name("shape type", type,
-                                             {"cube", "cylinder", "disk", "instance", "obj", "ply",
-                                              "rectangle", "serialized", "shapegroup", "sphere"}));
+                                             {"bsplinecurve", "cube", "cylinder", "disk",
+                                              "instance", "linearcurve", "obj", "ply", "rectangle",
+                                              "serialized", "shapegroup", "sphere"}));
   }
 
   RawMesh read_file(DescribedProperties& p, MeshOptions& options) {
@@ -297,6 +307,16 @@ class SceneBuilder {
     if (mirrors(options.to_world)) options.flip_normals = !options.flip_normals;  // as in Mitsuba
     options.to_world = options.to_world * place;
     return make_sphere();
+  }
+
+  // Tubes about curves, in world space: their radii are not transformed.
+  static RawMesh read_curves(DescribedProperties& p, MeshOptions& options) {
+    const bool spline = p.type() == "bsplinecurve";
+    const auto curves = parse_curves(p.file("filename"), spline ? 4 : 2, options.to_world);
+    options.to_world = {};
+    RawMesh raw = spline ? make_spline_tubes(curves) : make_linear_tubes(curves);
+    raw.where = {p.file("filename")};
+    return raw;
   }
 
   // Checks the free memory for shapes, at intervals.
