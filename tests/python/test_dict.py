@@ -213,3 +213,21 @@ def test_textures_stand_where_colours_do(tmp_path):
     image = card(texture, tmp_path)
     for row, value in ((1, 0.25), (2, 0.75)):  # v is up, rows go down
         assert np.allclose(image[row, 1:3], card(grey(value))[row, 1:3], rtol=1e-5)
+
+
+def test_texels_beyond_one_are_told(tmp_path):
+    limn.write_exr(str(tmp_path / "a.exr"), np.full((2, 2, 3), 2, dtype=np.float32))
+    with pytest.warns(UserWarning, match="bsdf.reflectance: warning: the texture reflects more"):
+        image = card({"type": "bitmap", "filename": "a.exr", "raw": True}, tmp_path)
+    assert np.allclose(image[1:3, 1:3], 2 * card(grey(1.0))[1:3, 1:3], rtol=1e-5)
+
+
+@pytest.mark.parametrize("kind", ["bsplinecurve", "linearcurve"])
+def test_curves_keep_their_radius(kind, tmp_path):
+    (tmp_path / "a.txt").write_text("".join(f"0 0 {z} 0.5\n" for z in range(5)))
+    scene = limn.load_dict({"type": "scene", "eye": {"type": "perspective"},
+                            "hair": {"type": kind, "filename": "a.txt",
+                                     "to_world": limn.Transform().scale(2)}}, str(tmp_path))
+    points = np.asarray(scene.mesh("hair").positions)
+    assert np.isclose(np.abs(points[:, :2]).max(), 0.5)
+    assert np.ptp(points[:, 2]) == pytest.approx(4 if kind == "bsplinecurve" else 9)
