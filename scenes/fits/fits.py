@@ -11,7 +11,6 @@
     scenes/fits/fits.py gears     how far each of fifteen gears is turned, from their shadows
     scenes/fits/fits.py displacement  162 vertices along their normals, from eight sides
     scenes/fits/fits.py curves    of these three: scenes/pictures/fit_curves.webp
-    scenes/fits/fits.py films     of these three: scenes/pictures/fit_films.webp
     scenes/fits/fits.py picture   of the shapes that these found: scenes/pictures/fits.webp
 
 Writes OUT/NAME/ (pictures, meshes, report.html) and prints a table. A fit that is there is not run
@@ -419,22 +418,6 @@ def curves(fits, _):
     return ["scene", "fit", "last / first loss"], rows
 
 
-def films(fits, _):
-    """What L-BFGS shows at some of its steps, and its target."""
-    from matplotlib import pyplot
-
-    shown = {"tree": (0, 1, 2, 4, 8), "gears": (0, 8, 12, 16, 28), "displacement": (0, 4, 8, 16, 40)}
-    figure, panels = panels_of(len(shown), max(map(len, shown.values())) + 1, 4.9)
-    for (name, steps), row in zip(shown.items(), panels):
-        files = [f"step_{step:05}_view_0.png" for step in steps] + ["view_0_target.png"]
-        for panel, file, title in zip(row, files, [*(f"{name}, {s}" for s in steps), "target"]):
-            panel.imshow(pyplot.imread(fits.path(f"{name}_lbfgs", file)), interpolation="nearest")
-            panel.set_title(title, fontsize=8)
-            panel.axis("off")
-    save(figure, "fit_films.webp", 85, 0.4)
-    return ["scene", "steps"], [[name, *steps] for name, steps in shown.items()]
-
-
 # A row for each: truth, start, and fits at some of their steps.
 SHOWN = [
     (CREATURE, [("mirrors_seed_1", 0), ("mirrors_seed_1", 75), ("mirrors_seed_1", 300),
@@ -464,7 +447,7 @@ def picture(fits, _):
 
 
 EXPERIMENTS = {**dict.fromkeys(SHAPES, fit_shape), "pose": pose, "drift": drift,
-               **dict.fromkeys(FUNCTIONS, fit_function), "curves": curves, "films": films,
+               **dict.fromkeys(FUNCTIONS, fit_function), "curves": curves,
                "picture": picture}
 
 
@@ -479,7 +462,7 @@ def main():
     parser.add_argument("--threads", type=int, help="default: all cores")
     parser.add_argument("--limn", default=os.path.join(ROOT, "build", "limn"), help="the program")
     arguments = parser.parse_args()
-    if arguments.only and arguments.name in ("drift", "curves", "films", "picture"):
+    if arguments.only and arguments.name in ("drift", "curves", "picture"):
         parser.error(f"--only: {arguments.name} is one whole")
     use_one_with_matplotlib()
     os.makedirs(arguments.output, exist_ok=True)
