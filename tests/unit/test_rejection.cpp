@@ -306,8 +306,8 @@ bool misses_dual_box(const Planes& planes, const Vec3d& w, double radius, double
   return std::fabs(middle) > reach;
 }
 
-// Li et al. 2018: the sphere over the segment from the origin to w misses the box of the feet of the
-// planes.
+// Li et al. 2018: the sphere over the segment from the origin to w misses the box of the feet of
+// the planes.
 bool misses_hough_box(const Planes& planes, const Vec3d& w, double wider) {
   double nearest = 0, farthest = 0;
   for (int i = 0; i < 3; ++i) {
