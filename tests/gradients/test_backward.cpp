@@ -8,6 +8,7 @@
 #include "limn/core/parameter.h"
 #include "limn/integrators/backward.h"
 #include "limn/integrators/gradient.h"
+#include "support/check_runs.h"
 #include "support/meshes.h"
 #include "support/scenes.h"
 
@@ -325,24 +326,10 @@ TEST(Backward, TexelsOverAFloorHaveTheirClosedForm) {
   }
 }
 
-// z-scores of all parameters, whose sum of squares has as many degrees of freedom at most.
-void expect_agreement(const Scene& scene, int spp, const BackwardOptions& options = {}) {
-  RunSettings settings;
-  settings.spp = spp;
-  settings.seed = 3;
-  settings.threads = 2;
-  for (const ReverseCheck& check : check_reverse(scene, options, settings)) {
-    fmt::print("{:28} forward {:10.4g} +- {:8.2g}  reverse {:10.4g} +- {:8.2g}  z {:5.2f}\n",
-               check.parameter, check.forward, check.forward_error, check.reverse,
-               check.reverse_error, check.z);
-    EXPECT_LT(std::fabs(check.z), 4.5) << check.parameter;
-  }
-}
-
 TEST(Backward, AgreesInMirrors) {
   const TempFiles files;
-  expect_agreement(mirror_scene(files, true), 32);
-  expect_agreement(mirror_scene(files, false), 32);
+  expect_modes_agree(mirror_scene(files, true), 32, {});
+  expect_modes_agree(mirror_scene(files, false), 32, {});
 }
 
 // The image is linear in a lamp's radiance, so that its derivative does not depend on it: no less
@@ -369,7 +356,7 @@ TEST(Backward, OfABlackLamp) {
             5 * std::sqrt(black.variance(0) + bright.variance(0)));
   BackwardOptions reverse;
   reverse.parameters = options.parameters;
-  expect_agreement(scene_of("0"), 256, reverse);
+  expect_modes_agree(scene_of("0"), 256, reverse);
 }
 
 // Any sampler of edges has the same mean.
@@ -402,7 +389,7 @@ TEST(Backward, AgreesWithLightInClosedForm) {
   const TempFiles files;
   BackwardOptions options;
   options.method = "analytic";
-  expect_agreement(lamps_scene(files), 16, options);
+  expect_modes_agree(lamps_scene(files), 16, options);
 }
 
 // Displacements tell nothing that the vertices do not: they are taken by name.
@@ -433,12 +420,12 @@ TEST(Backward, AgreesWithRegionsOfLight) {
   const Scene large = mirror_scene(files, true);
   BackwardOptions options;
   options.method = "silhouettes";
-  expect_agreement(large, 16, options);
+  expect_modes_agree(large, 16, options);
   options.terms = {"direct", "penumbra"};
   options.parameters = {"body.translate.x", "body.translate.y", "body.translate.z", "body.scale"};
-  expect_agreement(penumbra_scene(files, 0.02), 256, options);
+  expect_modes_agree(penumbra_scene(files, 0.02), 256, options);
   options.parameters = {"body.translate.y"};
-  expect_agreement(penumbra_scene(files, 0.1), 1024, options);
+  expect_modes_agree(penumbra_scene(files, 0.1), 1024, options);
   options.method = "forest";
   EXPECT_THROW(backward(large, random_adjoint(large, 1), options, RunSettings{}), InputError);
 }
@@ -461,21 +448,21 @@ TEST(Backward, AgreesWithBrightPatches) {
   const Scene scene = make_scene(files, parts);
   BackwardOptions options;
   options.method = "silhouettes";
-  expect_agreement(scene, 32, options);
+  expect_modes_agree(scene, 32, options);
   options.terms = {"direct"};
   options.parameters = {"body.translate.x", "body.translate.y", "body.translate.z", "body.scale"};
-  expect_agreement(scene, 256, options);
+  expect_modes_agree(scene, 256, options);
 }
 
 TEST(Backward, AgreesInSharpShadows) {
   const TempFiles files;
   for (const bool face_normals : {true, false})
-    expect_agreement(shadow_scene(files, face_normals), 64);
+    expect_modes_agree(shadow_scene(files, face_normals), 64, {});
 }
 
 TEST(Backward, AgreesWhereShapesCrossAndAreCut) {
   const TempFiles files;
-  expect_agreement(crossing_scene(files), 64);
+  expect_modes_agree(crossing_scene(files), 64, {});
 }
 
 // Nothing changes if all shapes and the camera move together.

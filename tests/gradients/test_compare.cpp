@@ -7,6 +7,7 @@
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <set>
 
 #include "integrators/methods/difference_method.h"
@@ -261,6 +262,22 @@ TEST(Differences, TakeTheStepThatIsGiven) {
   EXPECT_EQ(run.blocks.variances.size(), run.blocks.sums.size());
   ASSERT_EQ(method->settings().size(), 2u);
   EXPECT_EQ(std::get<double>(method->settings()[0].value), 0.015625);
+}
+
+// The sum over the image, resolved to a tenth.
+TEST(Differences, AgreeWithTheClosedForm) {
+  Job job;
+  job.input.step = 0.015625;
+  RunSettings settings = job.settings;
+  settings.spp = 32768;
+  const MethodRun run = make_method(job.input, "fd")->run(settings);
+  const std::vector<double> exact = exact_derivative();
+  const double truth = std::accumulate(exact.begin(), exact.end(), 0.0);
+  const double found = std::accumulate(run.image.begin(), run.image.end(), 0.0);
+  const std::vector<double>& variances = run.blocks.variances;
+  const double error = std::sqrt(std::accumulate(variances.begin(), variances.end(), 0.0));
+  EXPECT_LT(std::fabs(found - truth), 4.5 * error) << found << " +- " << error << ", " << truth;
+  EXPECT_LT(error, 0.1 / 6.2 * std::fabs(truth));
 }
 
 // Trials of exact power laws: squared bias B h^4, variance V / h^power.

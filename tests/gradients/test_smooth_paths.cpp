@@ -105,16 +105,9 @@ TEST_P(Moved, Agrees) {
 
 TEST_P(Moved, ReverseModeAgreesWithForwardMode) {
   const TempFiles files;
-  RunSettings settings;
-  settings.spp = 128;
-  settings.seed = 5;
   BackwardOptions options;
   options.parameters = {GetParam().parameter};
-  for (const ReverseCheck& r :
-       check_reverse(scene_with(files, GetParam().material), options, settings)) {
-    EXPECT_LT(std::fabs(r.z), 4.5)
-        << r.forward << " +- " << r.forward_error << ", " << r.reverse << " +- " << r.reverse_error;
-  }
+  expect_modes_agree(scene_with(files, GetParam().material), 128, options);
 }
 
 INSTANTIATE_TEST_SUITE_P(, Moved,

@@ -548,8 +548,9 @@ TEST_F(Program, LinksStay) {
 TEST_F(Program, SignalsThatEndItLeaveWhatIsDone) {
   for (const std::string signal : {"TERM", "HUP"}) {
     const Outcome outcome =
-        run("gradient " + scene_ + " --quiet --spp 1000000000 --wrt screen.translate.x -o " + out(),
-            "env --default-signal=HUP timeout --preserve-status -s " + signal + " 2 ");
+        call_and_send(std::string("env --default-signal=HUP ") + LIMN_PROGRAM + " gradient " +
+                          scene_ + " --quiet --spp 1000000000 --wrt screen.translate.x -o " + out(),
+                      "kill -" + signal + " $!");
     EXPECT_EQ(outcome.status, 130) << outcome.text;
     EXPECT_TRUE(std::filesystem::remove(out())) << signal;
   }

@@ -225,24 +225,26 @@ TEST_F(Program, FitsOfTwoProcessesDoNotShareAFolder) {
             std::string::npos);
 }
 
-// Steps take twice as long each, so that the interrupt comes within one, after a snapshot.
 // `timeout` and job schedulers send a process its signal, and then to its group.
 TEST_F(Program, SignalsThatComeAtOnceAreOneInterrupt) {
   const std::string image = files_.path("long.exr");
-  const Outcome outcome =
-      call(std::string("{ ") + LIMN_PROGRAM + " render " + scene_ + " --spp 100000000 -o " + image +
-           " & sleep 1; kill -INT $!; sleep 0.01; kill -INT $!; wait $!; }");
+  const Outcome outcome = call_and_send(
+      std::string(LIMN_PROGRAM) + " render " + scene_ + " --spp 100000000 -o " + image,
+      "kill -INT $!; sleep 0.01; kill -INT $!");
   EXPECT_NE(outcome.text.find("interrupted: "), std::string::npos) << outcome.text;
   EXPECT_TRUE(std::filesystem::exists(image));
 }
 
+// Steps take twice as long each, so that the interrupt comes within one, after a snapshot.
 TEST_F(Program, InterruptedFitsKeepPicturesAndTellWhatIsDamaged) {
   const std::string target = files_.path("target.exr"), folder = files_.path("fit");
   ASSERT_EQ(run("render " + scene_ + " --spp 1 -o " + target).status, 0);
   const Outcome outcome =
-      call(std::string("timeout -s INT 2 ") + LIMN_PROGRAM + " fit " + scene_ + " --target " +
-           target + " --wrt blaze.radiance --spp 1 --spp-doubling 1 --steps 40 --snapshots 1 " +
-           "--no-report -o " + folder);
+      call_and_send(std::string(LIMN_PROGRAM) + " fit " + scene_ + " --target " + target +
+                        " --wrt blaze.radiance --spp 1 --spp-doubling 1 --steps 40 --snapshots 1 "
+                        "--no-report -o " +
+                        folder,
+                    "kill -INT $!");
   EXPECT_NE(outcome.text.find("interrupted: "), std::string::npos) << outcome.text;
   const std::string file = folder + "/fit.json", text = bytes_of(file);
   const json fit = json::parse(text);

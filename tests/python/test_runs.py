@@ -189,14 +189,15 @@ def test_an_exception_of_progress_ends_the_run(scene):
     def stop(_):
         raise Stop
 
-    began = time.monotonic()
+    began = time.process_time()
     with pytest.raises(Stop):
-        limn.render(scene, spp=1 << 24, progress=stop)
-    assert time.monotonic() - began < 5
+        limn.render(scene, spp=1 << 24, progress=stop, threads=2)
+    assert time.process_time() - began < 5
     assert limn.render(scene, spp=1).spp == 1
 
 
-# A process of its own: the signal goes to its main thread alone, and comes while it renders.
+# A process of its own: the signal goes to its main thread alone, and comes while it renders. Clocks
+# are the processor's: other work on the machine makes nothing late.
 INTERRUPTED = """
     import os, signal, sys, threading, time
     import limn
@@ -204,33 +205,30 @@ INTERRUPTED = """
     ticks, sent, stop = [], [], threading.Event()
     def tick():
         while not stop.wait(0.005):
-            ticks.append(time.monotonic())
-    def kick():
-        time.sleep(0.4)
-        sent.append(time.monotonic())
+            ticks.append(time.process_time())
+    def kick():  # with the GIL held there would be no ticks
+        while len(ticks) < 10 or ticks[-1] < ticks[0] + 0.4:
+            time.sleep(0.005)
+        sent.append(time.process_time())
         os.kill(os.getpid(), signal.SIGINT)
-    for run in (lambda: limn.render(scene, spp=1 << 24),
-                lambda: limn.gradient(scene, "tent.scale", spp=1 << 24),
-                lambda: limn.backward(scene, [[1] * 16] * 12, spp=1 << 24),
-                lambda: limn.check(scene, "tent.scale", spp=1 << 22)):
-        for attempt in range(3):  # other work on the machine can make one late
-            ticks.clear()
-            stop.clear()
-            threads = [threading.Thread(target=f) for f in (tick, kick)]
-            for thread in threads:
-                thread.start()
-            try:
-                run()
-                sys.exit("no KeyboardInterrupt")
-            except KeyboardInterrupt:
-                late = time.monotonic() - sent[-1]
-            stop.set()
-            for thread in threads:
-                thread.join()
-            if late < 0.5:
-                break
+    for run in (lambda: limn.render(scene, spp=1 << 24, threads=2),
+                lambda: limn.gradient(scene, "tent.scale", spp=1 << 24, threads=2),
+                lambda: limn.backward(scene, [[1] * 16] * 12, spp=1 << 24, threads=2),
+                lambda: limn.check(scene, "tent.scale", spp=1 << 22, threads=2)):
+        ticks.clear()
+        stop.clear()
+        threads = [threading.Thread(target=f) for f in (tick, kick)]
+        for thread in threads:
+            thread.start()
+        try:
+            run()
+            sys.exit("no KeyboardInterrupt")
+        except KeyboardInterrupt:
+            print(time.process_time() - sent[-1])
+        stop.set()
+        for thread in threads:
+            thread.join()
         assert limn.render(scene, spp=1).spp == 1
-        print(f"{late:.3f} {len(ticks)}")
 """
 
 
@@ -238,11 +236,8 @@ def test_control_c_ends_runs_and_other_threads_go_on(folder):
     done = subprocess.run([sys.executable, "-c", textwrap.dedent(INTERRUPTED),
                            str(folder / "scene.xml")], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    rows = [line.split() for line in done.stdout.splitlines()]
-    assert len(rows) == 4
-    for late, ticks in rows:
-        assert float(late) < 0.5
-        assert int(ticks) > 5  # of about 80; with the GIL held there would be none
+    late = [float(line) for line in done.stdout.splitlines()]
+    assert len(late) == 4 and max(late) < 1
 
 
 def test_runs_in_several_threads_are_those_in_one(scene):

@@ -372,8 +372,7 @@ TEST_P(EdgeSamplers, OneOfSeveralIsOneAlone) {
 
 TEST_P(EdgeSamplers, MissNoEdgeThatContributes) {
   Rng rng(15, 0, 0);
-  for (const auto& [name, mesh] : test_meshes()) {
-    const EdgeSamplerInput input = test_input(mesh);
+  for (const auto& [name, input] : test_inputs()) {
     const auto sampler = make(input);
     for (int i = 0; i < 10; ++i) {
       const EdgeQuery q = random_query(rng);

@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 namespace limn {
 
 CheckResult run_check(const Scene& scene, const std::string& parameter, int spp,
@@ -32,6 +34,20 @@ void expect_agreement(const Scene& scene, const std::string& parameter, int spp)
   const CheckResult r = run_check(scene, parameter, spp);
   EXPECT_GT(r.windows.count, 0) << parameter;
   EXPECT_NE(r.verdict, Verdict::kDisagree) << parameter << ": suspect " << r.suspect;
+}
+
+std::vector<ReverseCheck> expect_modes_agree(const Scene& scene, int spp,
+                                             const BackwardOptions& options) {
+  RunSettings settings;
+  settings.spp = spp;
+  settings.seed = 3;
+  std::vector<ReverseCheck> checks = check_reverse(scene, options, settings);
+  for (const ReverseCheck& c : checks) {
+    fmt::print("{:28} forward {:10.4g} +- {:8.2g}  reverse {:10.4g} +- {:8.2g}  z {:5.2f}\n",
+               c.parameter, c.forward, c.forward_error, c.reverse, c.reverse_error, c.z);
+    EXPECT_LT(std::fabs(c.z), 4.5) << c.parameter;
+  }
+  return checks;
 }
 
 }  // namespace limn

@@ -1,8 +1,10 @@
 #pragma once
-// Derivatives held against finite differences, with what was found on the test's output.
+// Derivatives held against finite differences and reverse mode against forward mode, with what was
+// found on the test's output.
 #include <string>
 #include <vector>
 
+#include "limn/integrators/backward.h"
 #include "limn/integrators/check.h"
 
 namespace limn {
@@ -13,5 +15,8 @@ CheckResult run_check(const Scene& scene, const std::string& parameter, int spp,
                       const Method& method = Method(Task::kGradient));
 // Expects some blocks and no disagreement in them.
 void expect_agreement(const Scene& scene, const std::string& parameter, int spp);
+// Of all of options.parameters.
+std::vector<ReverseCheck> expect_modes_agree(const Scene& scene, int spp,
+                                             const BackwardOptions& options);
 
 }  // namespace limn

@@ -1,12 +1,13 @@
 #pragma once
 // The program as a user meets it: commands, exit statuses, what they print and write. The target's
-// LIMN_PROGRAM is its file.
+// LIMN_PROGRAM is its file; `run` takes another one from the environment's LIMN_PROGRAM.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
 #include <array>
 #include <cstdio>
+#include <cstdlib>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -39,7 +40,17 @@ inline Outcome call(const std::string& command) {
 
 // environment: as a shell takes it before a command, "NAME=VALUE ".
 inline Outcome run(const std::string& arguments, const std::string& environment = "") {
-  return call(environment + LIMN_PROGRAM + " " + arguments);
+  const char* other = std::getenv("LIMN_PROGRAM");
+  return call(environment + (other ? other : LIMN_PROGRAM) + " " + arguments);
+}
+
+// The outcome of a command to which a second one is sent ("kill $!") when it has worked for a second
+// of processor time: whatever else the machine does, it listens to signals then.
+inline Outcome call_and_send(const std::string& command, const std::string& signals) {
+  return call("{ " + command +
+              " & while set -- $(cat /proc/$!/stat); [ $3 != Z ] && [ ${14} -lt 100 ]; do sleep "
+              "0.05; done; " +
+              signals + "; wait $!; }");
 }
 
 inline std::string bytes_of(const std::string& file) {

@@ -7,6 +7,7 @@
 
 #include "limn/core/rng.h"
 #include "limn/core/vec.h"
+#include "limn/integrators/statistics.h"
 
 namespace limn {
 namespace {
@@ -21,6 +22,19 @@ std::vector<double> normal_numbers(uint64_t seed, size_t count) {
     v = std::sqrt(-2 * std::log(u)) * std::cos(angle);
   }
   return values;
+}
+
+// Quantiles of tables, with the normal ones of the same chance. The error goes with the square of the
+// degrees.
+TEST(Student, IsKnownByItsTables) {
+  const struct {
+    double degrees, t, z;
+  } quantiles[] = {{4, 2.7764, 1.95996},  {4, 7.1732, 3.09023},  {10, 2.2281, 1.95996},
+                   {10, 4.1437, 3.09023}, {30, 2.0423, 1.95996}, {30, 3.3852, 3.09023}};
+  for (const auto& of : quantiles) {
+    EXPECT_NEAR(normal_from_student(of.t, of.degrees), of.z, 0.6 / (of.degrees * of.degrees));
+    EXPECT_EQ(normal_from_student(-of.t, of.degrees), -normal_from_student(of.t, of.degrees));
+  }
 }
 
 std::vector<double> sum(const std::vector<double>& a, double factor, const std::vector<double>& b) {

@@ -82,20 +82,25 @@ def reason_of(message):
     return re.sub(r" \(known: .*", "", re.sub(r"^.*?error: ", "", message.splitlines()[0]))
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+def read_arguments(parser):
+    """Those of a tool that opens all scenes of a folder, with limn found and defines in pairs."""
     parser.add_argument("folder", metavar="DIR")
     parser.add_argument("--path", action="append", default=[], metavar="DIR")
     parser.add_argument("-D", dest="defines", action="append", default=[], metavar="NAME=VALUE")
     parser.add_argument("--at-least", type=int, default=0, metavar="N")
     parser.add_argument("--limn", metavar="PROGRAM", help="use this one (default: build/limn)")
     arguments = parser.parse_args()
-    limn = common.find_limn(arguments.limn)
-    defines = [define.split("=", 1) for define in arguments.defines]
+    arguments.limn = common.find_limn(arguments.limn)
+    arguments.defines = [define.split("=", 1) for define in arguments.defines]
+    return arguments
+
+
+def main():
+    arguments = read_arguments(argparse.ArgumentParser(description=__doc__.splitlines()[0]))
     scenes = find_scenes(arguments.folder)
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-        messages = list(pool.map(
-            lambda scene: open_scene(limn, scene, defines, arguments.path)[0], scenes))
+        messages = list(pool.map(lambda scene: open_scene(
+            arguments.limn, scene, arguments.defines, arguments.path)[0], scenes))
     refused = [(scene, message) for scene, message in zip(scenes, messages) if message]
     reasons = collections.Counter(reason_of(message) for _, message in refused)
     print(f"{'scenes':>6}  reason")

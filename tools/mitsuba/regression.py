@@ -161,15 +161,9 @@ def judge_reference(images, theirs, scene, options, spp):
 def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folder", metavar="DIR")
     parser.add_argument("--only", default="", metavar="TEXT", help="scenes whose path contains this")
-    parser.add_argument("--path", action="append", default=[], metavar="DIR")
-    parser.add_argument("-D", dest="defines", action="append", default=[], metavar="NAME=VALUE")
-    parser.add_argument("--at-least", type=int, default=0, metavar="N")
-    parser.add_argument("--limn", metavar="PROGRAM", help="use this one (default: build/limn)")
-    arguments = parser.parse_args()
-    limn = common.find_limn(arguments.limn)
-    defines = [define.split("=", 1) for define in arguments.defines]
+    arguments = census.read_arguments(parser)
+    limn = arguments.limn
     passed = tested = found = 0
     print(f"{'scene':52} {'Mitsuba: share':>14} {'limn: max z':>12} {'p':>8}")
     for scene in census.find_scenes(arguments.folder):
@@ -178,7 +172,7 @@ def main():
         if not references:
             continue
         found += 1
-        message, options = census.open_scene(limn, scene, defines, arguments.path)
+        message, options = census.open_scene(limn, scene, arguments.defines, arguments.path)
         if message:
             print(f"{name:52} {census.reason_of(message)}", flush=True)
             continue
