@@ -1,12 +1,14 @@
 """Faults, each a text that occurs once in its file and what replaces it, with the tests of its part.
 
-program: a test program of tests/CMakeLists.txt; tests: a filter of GoogleTest.
+program: a test program of tests/CMakeLists.txt, or "python"; tests: a filter of GoogleTest, or a
+file of tests/python; sources: of a fault in a header, the files that are compiled again with it.
 """
 
 from dataclasses import dataclass
 
 POWER = "test_term_power"
 TERMS = "integrators/terms/"
+PATHS = ("integrators/pilot/term_estimator.cpp", "integrators/methods/radiance_estimator.cpp")
 
 
 @dataclass(frozen=True)
@@ -18,15 +20,16 @@ class Fault:
     new: str
     program: str
     tests: str = "*"
+    sources: tuple = ()
 
 
 FAULTS = [
     Fault("interior", "score of a moving direction lost", "integrators/paths/path_vertices.h",
           "  detail::add_score<S>(walk, value(walk.throughput) * (1 / pdf));\n", "",
-          "test_moving_directions", "MovingDirections.*"),
+          "test_moving_directions", "MovingDirections.KeepTheMean*", PATHS),
     Fault("interior", "throughput not divided by survival", "integrators/paths/path_vertices.h",
           "  walk.throughput = walk.throughput * (1 / survival);\n", "",
-          "test_furnace"),
+          "test_furnace", "*", PATHS),
 
     Fault("camera", "wrong sign", TERMS + "film_edges.cpp",
           "if (dot(turn, side) < 0) {", "if (dot(turn, side) > 0) {", POWER, "*/camera"),
@@ -44,7 +47,7 @@ FAULTS = [
           "test_sensors", "Lens.Shows*"),
     Fault("camera", "edges of clip planes lost", TERMS + "camera_edges.cpp",
           "for (uint32_t c = 0; c < clips_.size(); ++c) add_clip(c);", "",
-          "test_crossings"),
+          "test_hard_scenes", "ClippedFloor.*"),
     Fault("camera", "edges inside textures lost", "integrators/edges/scene_edges.cpp",
           "if (segments.empty()) continue;", "continue;", "test_texture_edges"),
 
@@ -97,7 +100,7 @@ FAULTS = [
           "const double peak = 1.05 * layer.weight * film_.filter.eval(0) /", POWER, "*Filter*"),
     Fault("filter", "cut at the end of the film dropped", TERMS + "filter.cpp",
           "const double cut = kTaper * rng.uniform();", "const double cut = 0;",
-          "test_moving_directions", "FilmMotion.*"),
+          "test_moving_directions", "FilmMotion.RestsWhereFiltersEnd"),
 
     Fault("specular", "samples counted twice", TERMS + "glare_edges.cpp",
           "return view.count > 0 && cap_of", "return false && cap_of",
@@ -115,9 +118,9 @@ FAULTS = [
           "return 1.1 * mix(mix(c[0], c[1], along), mix(c[2], c[3], along), down) *",
           "test_environment_sampling"),
 
-    Fault("exact film", "centroid shifted", "integrators/film/pixel_parts.cpp",
+    Fault("faces", "centroid shifted", "integrators/film/pixel_parts.cpp",
           "part.my += area * (first.y + p.y + q.y) / 3;",
-          "part.my += area * (first.y + p.y + q.y) / 2.9;", "test_visible_regions", "ExactFilm.*"),
+          "part.my += area * (first.y + p.y + q.y) / 2.9;", "test_faces"),
     Fault("exact film", "corner on a cut lost", "src/regions/convex_region.cpp",
           "if (next == 0) part.push_back({after.at, here > 0 ? by : by.other()});", "",
           "test_visible_regions"),
@@ -130,6 +133,10 @@ FAULTS = [
     Fault("boundary", "last tree under shared nodes lost", "edgetree/forest/forest_build.cpp",
           "for (size_t i = kApart; i < trees.size(); ++i) {",
           "for (size_t i = kApart; i + 1 < trees.size(); ++i) {", "test_forest", "*ManyObjects*"),
+    Fault("edge samplers", "last tree under shared nodes lost", "edgetree/forest/forest_build.cpp",
+          "for (size_t i = kApart; i < trees.size(); ++i) {",
+          "for (size_t i = kApart; i + 1 < trees.size(); ++i) {", "test_edge_samplers",
+          "All/EdgeSamplers.DrawAsTheyState/forest"),
     Fault("differences", "smooth rays with equal shares", "src/bsdf/smooth.cpp",
           "return weight < 0.25 * sum ? 0.1 : weight < 0.75 * sum ? 0.5 : 0.9;",
           "return 0.5 + 0 * weight;", "test_smooth_lobes"),
@@ -138,6 +145,29 @@ FAULTS = [
     Fault("bounds", "quadrics 25 % too wide", "edgetree/bounds/pair_fit.cpp",
           "static_cast<float>(high + kRounding)",
           "static_cast<float>(high + 0.25 * (high - low) + kRounding)", "test_quadric", "Fits.*"),
+
+    Fault("bounds", "quadric's boxes of edges 25 % too wide", "edgetree/quadric/quadric_build.cpp",
+          "const double half = std::max(", "const double half = 1.25 * std::max(",
+          "test_quadric", "Quadric.BoxesOfEdgesAreTight"),
+    Fault("bounds", "moments of children in their own frame", "edgetree/bounds/plane_moments.cpp",
+          "d.row(3) << 2 * scale * shift[0],", "d.row(3) << scale * shift[0],",
+          "test_quadric", "PlaneMoments.*"),
+    Fault("bounds", "dual BVH's boxes 25 % too wide", "edgetree/baselines/dual_bvh_sampler.cpp",
+          "static_cast<float>(half), INFINITY", "static_cast<float>(1.25 * half), INFINITY",
+          "test_rejection", "RejectionTree.*"),
+    Fault("bounds", "Li's boxes of planes 25 % too wide", "edgetree/baselines/li2019_sampler.cpp",
+          "node.planes.extend(c.planes.upper);",
+          "node.planes.extend(c.planes.upper + (c.planes.upper - c.planes.lower) * 0.25);",
+          "test_rejection", "RejectionTree.*"),
+    Fault("bounds", "GGX's lobe x 1.25", "src/bsdf/microfacet_lobe.cpp",
+          "return a2 / (kPi * std::min", "return 1.25 * a2 / (kPi * std::min",
+          "test_edge_samplers", "LobeBound.*"),
+    Fault("bounds", "Beckmann's lobe x 1.25", "src/bsdf/microfacet_lobe.cpp",
+          "return c2 > 0 ? std::exp", "return c2 > 0 ? 1.25 * std::exp",
+          "test_edge_samplers", "LobeBound.*"),
+    Fault("bounds", "edges x 1.25", "edgetree/lobe/contribution_bound.cpp",
+          "return lobe.over_arc(u_a_, u_b_) *", "return 1.25 * lobe.over_arc(u_a_, u_b_) *",
+          "test_edge_samplers", "EdgeBound.*"),
 
     Fault("rejection", "silhouettes rejected near a side", "edgetree/forest/forest_query.cpp",
           "abs(plane.g[1]) + abs(plane.g[2]) + abs(plane.g[3]) + at.error;",
@@ -149,7 +179,7 @@ FAULTS = [
           "return 1.1 * scale * std::max(0.0, w.z) / (r2 * r2);", "test_ltc"),
     Fault("lobes", "GGX x 1.02", "src/bsdf/microfacet.h",
           "return a2 / (q * q * kPi);", "return a2 / (q * q * kPi) * 1.02;",
-          "test_bsdf_sampling"),
+          "test_bsdf_sampling", "*", ("src/bsdf/roughconductor.cpp", "src/bsdf/microfacet.cpp")),
 
     Fault("reverse", "angle derivative of normals lost", "src/mesh/normals_adjoint.cpp",
           "      adjoints[i].angles[c] += dot(s, shape.normal);\n", "",
@@ -178,14 +208,42 @@ FAULTS = [
           "static_cast<int64_t>(count) + index);", "static_cast<int64_t>(count) + index - 1);",
           "test_mesh"),
     Fault("readers", "beam width", "src/light/spot.cpp",
-          "0.75 * cutoff", "0.7 * cutoff", "test_scene"),
+          "0.75 * cutoff", "0.7 * cutoff", "test_lights", "DeltaLights.*"),
+    Fault("textures", "texels half a texel aside", "src/texture/bitmap.cpp",
+          "static_cast<double>(size) - 0.5;", "static_cast<double>(size);",
+          "test_bitmap", "Bitmap.*"),
+    Fault("materials", "density of a clearcoat x 1.2", "src/bsdf/principled.cpp",
+          "share.clearcoat * d * cos_m /", "1.2 * share.clearcoat * d * cos_m /",
+          "test_bsdf_sampling"),
+    Fault("MIS", "probability of the tree's second half", "src/light/light_tree.cpp",
+          "      probability *= 1 - share;\n", "      probability *= share;\n",
+          "test_lights", "LightTree.*"),
+    Fault("pilots", "samples go with the variance", "integrators/pilot/allocation.cpp",
+          "price > 0 ? std::sqrt(v) / price : 0", "price > 0 ? v / price : 0",
+          "test_allocation", "SpreadSamples.*"),
+    Fault("names", "several objects of a name", "src/scene_file/name_objects.cpp",
+          "if (taken_.insert(id).second) return id;", "if (taken_.insert(id); true) return id;",
+          "test_parameters"),
+    Fault("python", "left and right of a pose", "src/scene/camera_pose.cpp",
+          "dot(left, column(0)) > 0 ? left : -left", "dot(left, column(0)) > 0 ? -left : left",
+          "python", "test_geometry.py"),
+    Fault("python", "position of a pose lost", "src/scene/camera_pose.cpp",
+          "  camera.origin = dual(origin);\n", "", "python", "test_geometry.py"),
+    Fault("python", "directions of rays not normalised", "src/rays/first_hits.cpp",
+          "normalize(directions[i])", "directions[i]", "python", "test_geometry.py"),
+    Fault("python", "barycentric coordinates exchanged", "src/rays/first_hits.cpp",
+          "first.uv[0] = dot(cross(p - c[0], c[2] - c[0]), across) / area;",
+          "first.uv[0] = dot(cross(c[1] - c[0], p - c[0]), across) / area;",
+          "python", "test_geometry.py"),
     Fault("closed light", "side x 1.02", "integrators/lights/polygon_light.cpp",
           "sum += arc.s * (0.5 * arc.angle);", "sum += arc.s * (0.51 * arc.angle);",
           "test_closed_light"),
-    Fault("lifted start", "hollow faces lifted", "include/limn/core/surface_point.h",
-          "above < 0 ? -1 : kHollowLift;", "-1;", "test_lifted_points"),
+    Fault("lifted start", "motion of the lift lost", TERMS + "lane_sinks.cpp",
+          "if (form.lift) sum += rate_of_lift(scene, form, ray);", "",
+          "test_lifted_points", "*AgreeWithDifferences/*bulb*"),
     Fault("differences", "one-sided step", "integrators/methods/differences.cpp",
-          "weights[j] / (2 * steps[j]);", "weights[j] / steps[j];", "test_compare"),
+          "weights[j] / (2 * steps[j]);", "weights[j] / steps[j];",
+          "test_compare", "Differences.AgreeWithTheClosedForm"),
     Fault("fit", "memory of L-BFGS lost", "integrators/fit/quasi_newton.cpp",
           "add_multiple(r, weights[i] - other, steps[i]);", "add_multiple(r, -other, steps[i]);",
           "test_fit"),
