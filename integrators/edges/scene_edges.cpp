@@ -32,6 +32,17 @@ std::vector<TouchingShape> touching_shapes(const Scene& scene) {
   return shapes;
 }
 
+// Duplicates cross others along one line: it is that of the first, also where they would part.
+void leave_out_duplicates(const Scene& scene, std::vector<IntersectionSegment>& segments) {
+  if (segments.empty()) return;
+  const DuplicateFaces duplicates(scene);
+  if (duplicates.empty()) return;
+  std::erase_if(segments, [&](const IntersectionSegment& segment) {
+    return std::ranges::any_of(segment.faces,
+                               [&](FaceRef face) { return !(duplicates.first(face) == face); });
+  });
+}
+
 bool is_black_behind(const Shape& shape) { return shape.bsdf->side(false) == nullptr; }
 
 }  // namespace
@@ -50,7 +61,8 @@ EdgeSamplerInput make_scene_edges(const Scene& scene, int threads) {
   const std::vector<FacePair> pairs = find_face_pairs(meshes, pinhole, threads);
   const auto [contacts, parting] =
       unite_touching_edges(touching_shapes(scene), pairs, pinhole, threads, input.objects);
-  const std::vector<IntersectionSegment> crossings = find_intersections(meshes, pairs, threads);
+  std::vector<IntersectionSegment> crossings = find_intersections(meshes, pairs, threads);
+  leave_out_duplicates(scene, crossings);
   if (!crossings.empty() || !contacts.empty())
     input.objects.push_back(intersection_edges(meshes, crossings, contacts));
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {

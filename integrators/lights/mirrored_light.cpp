@@ -288,6 +288,15 @@ bool MirroredLight::sees(const Image& image, const Vec3d& p, Glare& glare) const
   return true;
 }
 
+// The cosine of the half vector, as the microfacets have it that mirror the light, see pdf().
+double MirroredLight::alignment(const Glare& glare, const Vec3d& w) {
+  if (glare.cone > 0) return dot(w, glare.toward);
+  const double cosine = -dot(w, glare.normal);
+  if (!(cosine > 0)) return -1;
+  const Vec3d half = glare.light + normalize(start_of(glare) - w / cosine);
+  return dot(half, glare.normal) / length(half);
+}
+
 // From a point over the plane by `nearness` in place of 1 in the same line of sight, the light is
 // scattered as that of a far one; then the solid angle is that at the point itself.
 double MirroredLight::pdf(const Glare& glare, const Vec3d& w) {

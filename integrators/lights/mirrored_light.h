@@ -92,6 +92,8 @@ class MirroredLight {
   static double pdf(const Mixture& mixture, const Vec3d& w, double scattered);
   // Of directions of one glare.
   static double pdf(const Glare& glare, const Vec3d& w);
+  // Greater where the glare is brighter: along an edge, its brightest point has the most.
+  static double alignment(const Glare& glare, const Vec3d& w);
   // A direction of the glares, from three numbers in [0, 1).
   static std::optional<Vec3d> sample(const Mixture& mixture, double u, double u1, double u2);
 

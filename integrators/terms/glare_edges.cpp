@@ -10,7 +10,7 @@ namespace {
 // Points for one sample. Not tuned.
 constexpr int kPoints = 2;
 // Wider glare is left to other samplers: lists would be long. Not tuned.
-constexpr double kWidest = 0.5;
+constexpr double kWidest = 0.8;
 // And narrower: by rounding a direction would lie in its cap or not.
 constexpr double kNarrowest = 1e-6;
 // What a piece weighs at least, over what it would if the glare filled its cap evenly.
@@ -18,8 +18,56 @@ constexpr double kEven = 0.1;
 // Glare is looked for if it is this many times as bright as what else is seen. With any
 // the error times time of a teapot under two emitters on gloss was 1.5 times as large.
 constexpr double kBright = 4;
+// Grazing glare is narrow across, and its cap says little. Facing glare fills its cap with this
+// share of its peak.
+constexpr double kOfPeak = 0.25;
+// The most times that a piece is halved. Not tuned.
+constexpr int kHalvings = 8;
+// Beside the middle of a piece, where it is asked which half holds its brightest point.
+constexpr double kBeside = 0x1p-7;
+
+// The most sharp edges of a glossy shape that are listed beside outlines, and the widest lobe of
+// one. Not tuned.
+constexpr size_t kMostOfShape = 64;
+constexpr double kGlossy = 0.35;
+
+// The halves of a piece, with half its weight each: a weight is that of the viewer's lobe, which
+// changes little over a piece.
+std::array<EdgePiece, 2> halves_of(const EdgePiece& piece) {
+  std::array<EdgePiece, 2> halves{piece, piece};
+  halves[0].t1 = halves[1].t0 = piece.place(0.5).t;
+  halves[0].inverse_l1 = halves[1].inverse_l0 = 0.5 * (piece.inverse_l0 + piece.inverse_l1);
+  for (EdgePiece& half : halves) half.weight = 0.5 * piece.weight;
+  return halves;
+}
 
 }  // namespace
+
+GlareEdges::GlareEdges(const Scene& scene, const EdgeSamplerInput& edges,
+                       const EdgeSampler& sampler, const MirroredLight& mirrored)
+    : edges_(edges), sampler_(sampler), mirrored_(mirrored) {
+  const auto is_glossy = [](const Bsdf* bsdf) {
+    return bsdf && bsdf->lobe().model->width(bsdf->lobe()) < kGlossy;
+  };
+  for (uint32_t o = 0; o < edges.objects.size(); ++o) {
+    const EdgeMesh& mesh = edges.objects[o];
+    if (!mesh.shape.valid() || mesh.of_texture()) continue;
+    if (mesh.count(EdgeClass::kSharp) > kMostOfShape) continue;
+    const auto& bsdf = scene.shape(mesh.shape).bsdf;
+    if (!is_glossy(bsdf->side(true)) && !is_glossy(bsdf->side(false))) continue;
+    for (uint32_t e = 0; e < mesh.edges.size(); ++e) {
+      const EdgeId id(e);
+      const auto& ends = mesh.edge(id).vertices;
+      if (mesh.edge(id).edge_class != EdgeClass::kSharp) continue;
+      of_gloss_.push_back({{ShapeId(o), id}, mesh.position(ends[0]), mesh.position(ends[1])});
+    }
+  }
+}
+
+bool GlareEdges::is_of_gloss(EdgeRef edge, const Vec3d& p) const {
+  const EdgeMesh& mesh = edges_.object(edge.object);
+  return is_candidate(mesh, edge.edge, p) && !is_outline(mesh, edge.edge, p);
+}
 
 void GlareEdges::list(const PathVertex& vertex, const EdgeQuery& query, View& view) const {
   static thread_local std::vector<ListedEdge> listed;
@@ -32,27 +80,57 @@ void GlareEdges::list(const PathVertex& vertex, const EdgeQuery& query, View& vi
     if (!(glare.half_angle > kNarrowest && glare.half_angle < kWidest)) continue;
     const DirectionCap cap{glare.toward, std::sin(glare.half_angle), std::cos(glare.half_angle)};
     const double solid_angle = 2 * kPi * cap.sine * cap.sine / (1 + cap.cosine);
-    if (!(glare.irradiance > kBright * solid_angle * mixture.elsewhere)) continue;
+    const double peak = MirroredLight::pdf(glare, cap.axis);
+    const double bright = std::max(1 / solid_angle, kOfPeak * peak);
+    if (!(glare.irradiance * bright > kBright * mixture.elsewhere)) continue;
     const std::optional<DirectionCone> cone = cone_around(cap, query.n);
     if (!cone) continue;
     listed.clear();
     pieces.clear();
     if (!sampler_.list_outlines(query, *cone, listed)) return;
+    for (const ListedEdge& edge : of_gloss_) {
+      if (is_of_gloss(edge.id, query.p) && !is_own_edge(edges_, query, edge.id)) {
+        listed.push_back(edge);
+      }
+    }
     cut_edges(edges_, query, *cone, listed, pieces);
     if (pieces.empty()) continue;
-    const auto k = static_cast<uint32_t>(view.count);
-    view.caps[view.count++] = cap;
-    const double even = kEven / solid_angle;
-    for (const EdgePiece& piece : pieces) {
-      double bright = even;
-      for (const double u : {0.25, 0.75}) {
-        const EdgeSample at{piece.edge, piece.place(u).t, 1, 1};
-        bright += 0.5 * MirroredLight::pdf(glare, direction(query, at));
-      }
-      const double before = view.pieces.empty() ? 0 : view.pieces.back().sum;
-      view.pieces.push_back({k, piece, before + piece.weight * bright * glare.irradiance});
-    }
+    view.caps[view.count] = cap;
+    // Of a lobe of that peak, and in the other direction as wide as one that faces the point.
+    const double narrow = 1 / (kPi * peak * glare.half_angle);
+    for (const EdgePiece& piece : pieces) add_pieces(query, glare, piece, narrow, view);
+    ++view.count;
   }
+}
+
+void GlareEdges::add_pieces(const EdgeQuery& query, const MirroredLight::Glare& glare,
+                            EdgePiece piece, double narrow, View& view) const {
+  const auto direction_at = [&](const EdgePiece& of, double u) {
+    return direction(query, {of.edge, of.place(u).t, 1, 1});
+  };
+  const DirectionCap& cap = view.caps[view.count];
+  const double even = kEven / (2 * kPi * cap.sine * cap.sine / (1 + cap.cosine));
+  const auto add = [&](const EdgePiece& part) {
+    double bright = even;
+    // At the ends: beside the brightest point it is brightest there.
+    for (const double u : {0.0, 1.0}) {
+      bright += 0.5 * MirroredLight::pdf(glare, direction_at(part, u));
+    }
+    const double before = view.pieces.empty() ? 0 : view.pieces.back().sum;
+    view.pieces.push_back({static_cast<uint32_t>(view.count), part,
+                           before + part.weight * bright * glare.irradiance});
+  };
+  for (int i = 0; i < kHalvings; ++i) {
+    if (length(direction_at(piece, 1) - direction_at(piece, 0)) <= narrow) break;
+    const auto brightness = [&](double u) {
+      return MirroredLight::alignment(glare, direction_at(piece, u));
+    };
+    const int brighter = brightness(0.5 + kBeside) > brightness(0.5 - kBeside) ? 1 : 0;
+    const auto halves = halves_of(piece);
+    add(halves[1 - brighter]);
+    piece = halves[brighter];
+  }
+  add(piece);
 }
 
 Vec3d GlareEdges::direction(const EdgeQuery& query, const EdgeSample& sample) const {
@@ -70,8 +148,10 @@ std::optional<uint32_t> GlareEdges::cap_of(const View& view, const Vec3d& omega)
 }
 
 bool GlareEdges::hold(const View& view, const EdgeQuery& query, const EdgeSample& sample) const {
-  return view.count > 0 && cap_of(view, direction(query, sample)) &&
-         is_outline(edges_.object(sample.edge.object), sample.edge.edge, query.p);
+  if (view.count == 0 || !cap_of(view, direction(query, sample))) return false;
+  const auto is_it = [&](const ListedEdge& edge) { return edge.id == sample.edge; };
+  return is_outline(edges_.object(sample.edge.object), sample.edge.edge, query.p) ||
+         std::ranges::any_of(of_gloss_, is_it);
 }
 
 void GlareEdges::draw(const View& view, const EdgeQuery& query, const Rng& rng, int samples,

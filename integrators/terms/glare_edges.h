@@ -16,9 +16,8 @@ namespace limn {
 class GlareEdges {
  public:
   // All must outlive it. mirrored: not null.
-  GlareEdges(const EdgeSamplerInput& edges, const EdgeSampler& sampler,
-             const MirroredLight& mirrored)
-      : edges_(edges), sampler_(sampler), mirrored_(mirrored) {}
+  GlareEdges(const Scene& scene, const EdgeSamplerInput& edges, const EdgeSampler& sampler,
+             const MirroredLight& mirrored);
 
   // What one point sees.
   struct View {
@@ -35,6 +34,12 @@ class GlareEdges {
             std::vector<DirectPoint>& points) const;
 
  private:
+  // Adds a piece of the cap that is next in the view, halved around its brightest point until its
+  // directions are as close together as `narrow`.
+  void add_pieces(const EdgeQuery& query, const MirroredLight::Glare& glare, EdgePiece piece,
+                  double narrow, View& view) const;
+  // Whether the edge is between two faces that the point sees, one of which may show glare.
+  bool is_of_gloss(EdgeRef edge, const Vec3d& p) const;
   Vec3d direction(const EdgeQuery& query, const EdgeSample& sample) const;
   // The first cap that holds a direction.
   static std::optional<uint32_t> cap_of(const View& view, const Vec3d& omega);
@@ -42,6 +47,7 @@ class GlareEdges {
   const EdgeSamplerInput& edges_;
   const EdgeSampler& sampler_;
   const MirroredLight& mirrored_;
+  std::vector<ListedEdge> of_gloss_;  // sharp edges of glossy shapes
 };
 
 }  // namespace limn

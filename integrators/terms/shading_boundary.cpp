@@ -27,7 +27,7 @@ class BoundaryTerm final : public Term {
         nothing_(input.warps && std::all_of(edges_.objects.begin(), edges_.objects.end(),
                                             [](const EdgeMesh& m) { return m.edges.empty(); })) {
     if (context_.flat_mirrors) mirrors_.emplace(context_, edges_, sampler_);
-    if (context_.mirrored) glare_.emplace(edges_, sampler_, *context_.mirrored);
+    if (context_.mirrored) glare_.emplace(context_.scene, edges_, sampler_, *context_.mirrored);
     emitters_jump_ = std::ranges::any_of(edges_.objects, [&](const EdgeMesh& mesh) {
       return is_textured_emitter(mesh) && (mesh.of_texture() || mesh.count(EdgeClass::kSharp) > 0);
     });

@@ -156,6 +156,32 @@ TEST_F(Copies, MoveTogether) {
   }
 }
 
+// Where both pass through a third shape, the line of that counts once.
+TEST_F(Copies, PassThroughOthers) {
+  const auto found = [](bool copy, const std::vector<std::string>& parameters, uint64_t seed) {
+    const TempFiles files;
+    SceneParts parts;
+    parts.body = constant_light("sky", "0.4, 0.5, 0.7") +
+                 obj_shape("ball", write_mesh(files, "ball.obj", icosphere_mesh(1)), true, 0.7,
+                           {0.1, 0.5, 0}, diffuse("clay", "0.7, 0.2, 0.1"));
+    for (const char* name : {"plate", "again"}) {
+      if (!copy && name == std::string("again")) break;
+      parts.body += square(name, 1.5, -80, {0, 0.4, 0}, "<ref id=\"chalk\"/>");
+    }
+    parts.body +=
+        "<bsdf type=\"twosided\" id=\"chalk\">" + diffuse("white", "0.8, 0.9, 0.8") + "</bsdf>";
+    return run_blocks(make_scene(files, parts), parameters, 256, seed).parameters;
+  };
+  expect_equal(found(true, {"ball.translate.y"}, 1)[0], found(false, {"ball.translate.y"}, 2)[0]);
+  const auto two = found(true, {"plate.translate.y", "again.translate.y"}, 3);
+  const Moments one = found(false, {"plate.translate.y"}, 4)[0].image_sum;
+  const auto& [a, b] = std::tie(two[0].image_sum, two[1].image_sum);
+  const double error = std::sqrt(a.variance(0)) + std::sqrt(b.variance(0));
+  fmt::print("{} + {} against {}\n", a.mean(0), b.mean(0), one.mean(0));
+  EXPECT_LT(std::fabs(a.mean(0) + b.mean(0) - one.mean(0)),
+            4 * std::hypot(error, std::sqrt(one.variance(0))));
+}
+
 TEST_F(Copies, AreWarnedOf) {
   const TempFiles files;
   SceneParts parts;

@@ -283,6 +283,53 @@ TEST(MirroredLight, EdgesBeforeTheGlare) {
   }
 }
 
+// Faces cut into four, so many times.
+Mesh cut_faces(Mesh mesh, int times) {
+  for (int k = 0; k < times; ++k) {
+    std::vector<Vec3f> positions;
+    std::vector<FaceIndices> faces;
+    for (const auto& [a, b, c] : mesh.faces) {
+      const Vec3f p = mesh.positions[a], q = mesh.positions[b], r = mesh.positions[c];
+      const Vec3f pq = (p + q) * 0.5f, qr = (q + r) * 0.5f, rp = (r + p) * 0.5f;
+      for (const auto& corners : {std::array{p, pq, rp}, {pq, q, qr}, {rp, qr, r}, {pq, qr, rp}}) {
+        const auto first = static_cast<uint32_t>(positions.size());
+        positions.insert(positions.end(), corners.begin(), corners.end());
+        faces.push_back({first, first + 1, first + 2});
+      }
+    }
+    mesh = make_mesh(positions, faces);
+  }
+  return mesh;
+}
+
+// A floor close to a glossy box sees the sun's grazing glare in the side over it, which ends at the
+// box's own edges, below in one between two faces in view. A box of too many faces has no glare.
+TEST(MirroredLight, GrazingGlareEndsAtEdgesOfTheGloss) {
+  const TempFiles files;
+  GradientOptions options;
+  options.parameters = {"body.translate.z"};
+  options.terms = {"boundary"};
+  options.method = "silhouettes";
+  std::vector<GradientResult> found;
+  for (const bool coarse : {true, false}) {
+    SceneParts parts;
+    parts.width = parts.height = 8;
+    parts.origin = {0.1, 1.2, 1.4};
+    parts.target = {0.1, 0, 0.4};
+    const Mesh mesh = coarse ? cube_mesh() : cut_faces(cube_mesh(), 3);
+    parts.body = square("floor", 3, -90, {0, 0, 0}, diffuse("paint", "0.7, 0.7, 0.7")) +
+                 obj_shape("body", write_mesh(files, "body.obj", mesh), true, 0.4, {0, 0.45, 0},
+                           conductor("gloss", 0.16)) +
+                 R"(<emitter type="directional"><vector name="direction" value="-0.2, -1, -0.05"/>
+                    <rgb name="irradiance" value="2, 2, 2"/></emitter>)";
+    found.push_back(run_blocks(make_scene(files, parts), options, 2048, coarse));
+  }
+  expect_equal(found[0].parameters[0], found[1].parameters[0]);
+  const auto variance = [&](int i) { return found[i].parameters[0].image_sum.variance(0); };
+  fmt::print("squared error {:.3g}, without {:.3g}\n", variance(0), variance(1));
+  EXPECT_LT(3 * variance(0), variance(1));
+}
+
 // Of all that the view stands for, in parts of edges.
 double length_held(const GlareEdges& glare, const EdgeSamplerInput& edges,
                    const GlareEdges::View& view, const EdgeQuery& query, Rng& rng) {
@@ -327,7 +374,7 @@ TEST(MirroredLight, EdgesAreDrawnWhereTheyAreLeftOut) {
   TermInput input(context, 1, {1, 1, 1, 1}, edge_sampler_type("forest"), 1);
   const auto mirrored = MirroredLight::make(scene, lights);
   ASSERT_TRUE(mirrored);
-  const GlareEdges glare(input.edges(), input.edge_sampler(), *mirrored);
+  const GlareEdges glare(scene, input.edges(), input.edge_sampler(), *mirrored);
   RunningMean drawn, left_out;
   Rng rng(11, 0, 0);
   int views = 0;
