@@ -98,13 +98,15 @@ void GlareEdges::list(const PathVertex& vertex, const EdgeQuery& query, View& vi
     view.caps[view.count] = cap;
     // Of a lobe of that peak, and in the other direction as wide as one that faces the point.
     const double narrow = 1 / (kPi * peak * glare.half_angle);
-    for (const EdgePiece& piece : pieces) add_pieces(query, glare, piece, narrow, view);
+    for (const EdgePiece& piece : pieces) {
+      add_pieces(query, glare, mixture.elsewhere, piece, narrow, view);
+    }
     ++view.count;
   }
 }
 
 void GlareEdges::add_pieces(const EdgeQuery& query, const MirroredLight::Glare& glare,
-                            EdgePiece piece, double narrow, View& view) const {
+                            double elsewhere, EdgePiece piece, double narrow, View& view) const {
   const auto direction_at = [&](const EdgePiece& of, double u) {
     return direction(query, {of.edge, of.place(u).t, 1, 1});
   };
@@ -118,7 +120,7 @@ void GlareEdges::add_pieces(const EdgeQuery& query, const MirroredLight::Glare& 
     }
     const double before = view.pieces.empty() ? 0 : view.pieces.back().sum;
     view.pieces.push_back({static_cast<uint32_t>(view.count), part,
-                           before + part.weight * bright * glare.irradiance});
+                           before + part.weight * (bright * glare.irradiance + elsewhere)});
   };
   for (int i = 0; i < kHalvings; ++i) {
     if (length(direction_at(piece, 1) - direction_at(piece, 0)) <= narrow) break;

@@ -36,9 +36,9 @@ class GlareEdges {
 
  private:
   // Adds a piece of the cap that is next in the view, halved around its brightest point until its
-  // directions are as close together as `narrow`.
-  void add_pieces(const EdgeQuery& query, const MirroredLight::Glare& glare, EdgePiece piece,
-                  double narrow, View& view) const;
+  // directions are as close together as `narrow`. elsewhere: luminance beside the glare.
+  void add_pieces(const EdgeQuery& query, const MirroredLight::Glare& glare, double elsewhere,
+                  EdgePiece piece, double narrow, View& view) const;
   // Whether the edge is between two faces that the point sees, one of which may show glare.
   bool is_of_gloss(EdgeRef edge, const Vec3d& p) const;
   Vec3d direction(const EdgeQuery& query, const EdgeSample& sample) const;
