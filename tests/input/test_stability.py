@@ -26,7 +26,7 @@ import exr  # noqa: E402
 import numpy as np  # noqa: E402
 from common import read_json  # noqa: E402
 from stability_suite import (  # noqa: E402
-    closed_form, families, statistics, suite, table, verdicts)
+    calibration, closed_form, families, statistics, suite, table, verdicts)
 from stability_suite.program import DEFAULT_METHODS, Program, method_names  # noqa: E402
 from stability_suite.statistics import Estimate  # noqa: E402
 
@@ -39,6 +39,44 @@ class BySamples(Program):
 
     def length(self, seconds):
         return ["--spp", str(round(seconds))]
+
+
+class TestStatedErrors(unittest.TestCase):
+    @staticmethod
+    def runs(stated, count=4000):
+        random = np.random.default_rng(5)
+        images = random.normal(3, 0.1, (count, 2, 2))
+        return [(image.sum(), stated * 0.2, image, np.full((2, 2), stated * 0.1))
+                for image in images]
+
+    def test_ratios(self):
+        # Of a standard deviation of that many values the error is 1 / sqrt(2 n).
+        for stated in (0.5, 1, 2):
+            found = calibration.ratios(self.runs(stated))
+            self.assertAlmostEqual(found["sum"], stated, delta=4 * stated / 8000**0.5)
+            self.assertAlmostEqual(found["pixel"], stated, delta=4 * stated / 8000**0.5)
+        self.assertLess(calibration.ratios(self.runs(1))["beyond"], 0.008)
+        self.assertGreater(calibration.ratios(self.runs(0.5))["beyond"], 0.1)
+
+    def test_table_is_put_into_a_page_and_replaced(self):
+        rows = [{"scene": "sun", "method": "fd", "spp": spp, "sum": 0.5, "pixel": 2, "beyond": 0.25}
+                for spp in calibration.LEVELS]
+        with tempfile.TemporaryDirectory(prefix="limn_stability_") as folder:
+            page = os.path.join(folder, "page.md")
+            with open(page, "w", encoding="utf-8") as out:
+                out.write("# Page\n")
+            for _ in range(2):
+                calibration.publish(page, rows)
+            with open(page, encoding="utf-8") as stream:
+                text = stream.read()
+        self.assertTrue(text.startswith("# Page\n"))
+        self.assertEqual(text.count("| `fd` | " + "0.50, 2.00 | " * len(calibration.LEVELS)), 1)
+
+    def test_every_method_and_scene_is_known(self):
+        self.assertEqual(set(calibration.gradient_methods(LIMN)) & {"adaptive", "was", "fd"},
+                         {"adaptive", "was", "fd"})
+        for name, value in calibration.SCENES.items():
+            self.assertIn(value, families.find(name).values)
 
 
 class TestScenes(unittest.TestCase):
