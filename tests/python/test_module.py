@@ -12,6 +12,7 @@ import limn
 import numpy as np
 import pytest
 from conftest import ROOT
+from limn._processor import missing
 
 EXAMPLES = os.path.join(ROOT, "tools", "python", "examples")
 STUB = os.path.join(os.path.dirname(limn.__file__), "_limn.pyi")
@@ -86,6 +87,12 @@ def test_the_stubs_defaults_are_those_of_the_code(scene):
         fit.run(1)
     assert fits[0].history[0].loss == fits[1].history[0].loss
     np.testing.assert_array_equal(*(fit.scenes[0][moved] for fit in fits))
+
+
+def test_wheels_tell_what_a_processor_lacks():
+    info = "processor\t: 0\nflags\t\t: fpu avx fma\nbugs\t: none\n"
+    assert missing("avx2 fma bmi2", info) == ["avx2", "bmi2"]
+    assert missing("avx fma", info) == missing("avx2", "processor\t: 0\n") == []
 
 
 # PyTorch may not be there, and has no types of its own for what is subclassed.

@@ -8,6 +8,7 @@
 
 from collections.abc import Mapping as _Mapping
 
+from . import _processor as _processor  # before what it checks for
 from ._limn import (
     Check,
     ComparedMethod,

@@ -1,0 +1,15 @@
+"""The program in place of Python: `python -m limn render ...`, and the command `limn` of a wheel."""
+
+import os
+import sys
+
+
+def main() -> None:
+    program = os.path.join(os.path.dirname(os.path.abspath(__file__)), "bin", "limn")
+    if not os.path.exists(program):
+        sys.exit("limn: this build of the module holds no program: call build/limn")
+    os.execv(program, ["limn", *sys.argv[1:]])
+
+
+if __name__ == "__main__":
+    main()
