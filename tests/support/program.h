@@ -44,8 +44,8 @@ inline Outcome run(const std::string& arguments, const std::string& environment 
   return call(environment + (other ? other : LIMN_PROGRAM) + " " + arguments);
 }
 
-// The outcome of a command to which a second one is sent ("kill $!") when it has worked for a second
-// of processor time: whatever else the machine does, it listens to signals then.
+// The outcome of a command to which a second one is sent ("kill $!") when it has worked for a
+// second of processor time: whatever else the machine does, it listens to signals then.
 inline Outcome call_and_send(const std::string& command, const std::string& signals) {
   return call("{ " + command +
               " & while set -- $(cat /proc/$!/stat); [ $3 != Z ] && [ ${14} -lt 100 ]; do sleep "

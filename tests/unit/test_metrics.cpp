@@ -24,8 +24,8 @@ std::vector<double> normal_numbers(uint64_t seed, size_t count) {
   return values;
 }
 
-// Quantiles of tables, with the normal ones of the same chance. The error goes with the square of the
-// degrees.
+// Quantiles of tables, with the normal ones of the same chance. The error goes with the square of
+// the degrees.
 TEST(Student, IsKnownByItsTables) {
   const struct {
     double degrees, t, z;
