@@ -8,8 +8,8 @@
 
 namespace limn {
 
-// Whether the path takes a smooth ray: which one, then. Else what is left of the third number is as
-// it was.
+// Chooses a smooth ray (true) or the rough lobes (false); the third number is then rescaled to
+// [0, 1).
 template <class S, class Visitor>
 inline bool PathTracer<S, Visitor>::turns_smoothly(Walk& walk) const {
   if (!walk.scattering->is_smooth()) return false;
@@ -69,8 +69,8 @@ inline bool PathTracer<S, Visitor>::turn_smoothly(Walk& walk) const {
   return goes_on(walk, 0);
 }
 
-// Of `count` walks those that take smooth rays and go on: they are put into `turned`, and how many
-// they are is returned. The others stay, and are counted.
+// Moves those of `count` walks that take smooth rays and go on into `turned`, and returns their
+// number. The others stay, and are counted.
 template <class S, class Visitor>
 inline size_t PathTracer<S, Visitor>::turn_smoothly(Walk** walks, size_t& count,
                                                     Walk** turned) const {

@@ -1,6 +1,6 @@
 #pragma once
-// What is seen straight through surfaces: `mask`, `null` and `thindielectric` let light pass on in
-// its direction. Whatever lies beyond is seen where it is, times what passes.
+// Null interactions: `mask`, `null` and `thindielectric` transmit light without a deflection. What
+// lies beyond keeps its position and is attenuated.
 #include <optional>
 
 #include "integrators/paths/path_context.h"
@@ -19,7 +19,7 @@ struct StraightWay {
   Vec3d from;                     // from where, on
   FaceRef start = {};             // this face, if any
   int bounces = 0;                // of the path, what it has passed included
-  Rgb<double> share = grey(1.0);  // of what arrives there, that the viewer gets
+  Rgb<double> share = grey(1.0);  // the throughput from there to the viewer
 
   // Goes on through a face that the ray from there along the unit direction omega meets; false if
   // nothing passes it, or the path is too long.

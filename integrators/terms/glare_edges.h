@@ -1,9 +1,9 @@
 #pragma once
-// Edges before the glare of small lights on flat gloss (mirrored_light.h), as one point sees them.
-// A path that passes them at the glare is a hundred times as bright as others, of which the weights
-// of edge samplers know nothing. So within a cap of directions around each glare outlines, and
-// edges of the gloss between two faces in view, are listed and drawn by what they would add, and
-// other samplers leave these out.
+// Edges in front of specular reflections of small lights in flat glossy faces (mirrored_light.h),
+// as one point sees them. Paths there are a hundred times brighter, which weights of edge samplers
+// ignore. Within a cap of directions around each reflection, outlines, and edges of glossy shapes
+// with both faces visible, are listed and drawn by what they would add; other samplers leave them
+// out.
 #include <optional>
 #include <vector>
 

@@ -8,8 +8,8 @@
 namespace limn {
 
 // Several errors as one. what() has a line for each, in the order in which they were found, and
-// their count where there are two or more. Without lines it stands for errors that are reported
-// already: of an object that needs one that failed.
+// their count where there are two or more. Without lines: an object needs one that failed, whose
+// errors are already reported.
 class InputErrors final : public InputError {
  public:
   explicit InputErrors(std::vector<std::string> lines = {});
@@ -25,7 +25,7 @@ class InputErrors final : public InputError {
 class ErrorList {
  public:
   // Runs `step` and keeps the InputError that it may throw, a repeated one once. Returns whether it
-  // threw none. A list that is full throws all of its errors, through other calls of keep() on it.
+  // threw none. A full list (20) throws all its errors, also out of nested calls of keep().
   template <class Step>
   bool keep(const Step& step) {
     try {

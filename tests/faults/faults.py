@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Plants the faults of fault_list.py one at a time and tells which test of its part catches each.
+"""Mutation tests: plants the faults of fault_list.py one at a time; tells which test catches each.
 
     tests/faults/faults.py [--only NAME ...] [--jobs N] [--write]
 

@@ -9,13 +9,13 @@
 
 namespace limn {
 
-// By blocks of four pixels. Expects that all is finite.
+// Uses blocks of four pixels; expects finite results.
 CheckResult run_check(const Scene& scene, const std::string& parameter, int spp,
                       const std::vector<std::string>& terms = {},
                       const Method& method = Method(Task::kGradient));
 // Expects some blocks and no disagreement in them.
 void expect_agreement(const Scene& scene, const std::string& parameter, int spp);
-// Of all of options.parameters.
+// Checks every one of options.parameters.
 std::vector<ReverseCheck> expect_modes_agree(const Scene& scene, int spp,
                                              const BackwardOptions& options);
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Holds limn's images against the reference images of Mitsuba's own regression tests.
+"""Compares limn's images with the reference images of Mitsuba's own regression tests.
 
     tools/mitsuba/regression.py DIR [--only TEXT] [--path DIR] [-D name=value] [--at-least N]
 

@@ -104,7 +104,7 @@ def against_others_text(stored_records):
              for method, ratio, count in against_others(stored_records)]
     if not parts:
         return ""
-    return f"Where both are right, {OURS} has this much error: {', '.join(parts)}."
+    return f"Where both are right, {OURS} has this share of their error: {', '.join(parts)}."
 
 
 def who_breaks(family, records, method):
@@ -134,7 +134,7 @@ def markdown(stored_records):
             lines.append(f"| {family.name} | {knob} | " + " | ".join(row) + " |")
     if right:
         lines += ["", *textwrap.wrap("Every method is right in: " + "; ".join(right) + ".", 100)]
-    lines += ["", f"Seconds of a run: {seconds_of(stored_records)}."]
+    lines += ["", f"Each run takes {seconds_of(stored_records)} s."]
     lines += textwrap.wrap(against_others_text(stored_records), 100) + [""]
     used = [w for w in ORDER if any(w in verdicts(rs, m) for _, rs in stored_records
                                     for m in methods)]

@@ -8,9 +8,9 @@ RIGHT, NOISY, BIASED, LATE, FAILS, REFUSES, UNKNOWN = (
 # From the worst.
 ORDER = [FAILS, BIASED, LATE, REFUSES, NOISY, UNKNOWN, RIGHT]
 MEANING = {
-    RIGHT: "no bias found, and nearer to the truth than a black image",
-    NOISY: "no bias found, but further from the truth than a black image",
-    BIASED: "off by more than chance explains, and again in longer runs",
+    RIGHT: "no bias found, relative error below 1",
+    NOISY: "no bias found, relative error above 1",
+    BIASED: "differs from the reference (p < 1e-5), again in longer runs",
     LATE: "two samples per pixel took more than one and a half times the seconds of a run",
     FAILS: "a crash, no end, or a result that is not finite",
     REFUSES: "an error that says why",
