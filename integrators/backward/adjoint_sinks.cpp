@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "integrators/film/clip_curves.h"
+#include "integrators/terms/mirror_sight.h"
 #include "limn/core/reverse.h"
 
 namespace limn {
@@ -55,10 +56,16 @@ void FilmPointAdjoint::add(const Rgb<double>& amount) {
   motion_.contribute(tape_, seeds_, *form_, weight);
   if (motion_.slots().camera == 0 && form_->by.count == 0) return;
   auto ray = ray_at(camera_leaves(motion_.scene().camera), place_);
-  reflect_ray(form_->by, moving_corners(motion_.scene()), ray.origin, ray.direction);
+  double distance = form_->distance;
+  if (form_->by.through) {
+    refract_ray(motion_.scene(), form_->by, ray.origin, ray.direction);
+    distance = length(form_->x - value(ray.origin));
+  } else {
+    reflect_ray(form_->by, moving_corners(motion_.scene()), ray.origin, ray.direction);
+  }
   const Vec3d g = form_->of_ray() * weight;
   seeds_.add(ray.origin, g);
-  seeds_.add(ray.direction, g * form_->distance);
+  seeds_.add(ray.direction, g * distance);
 }
 
 // With J the derivative of the film position of a point of the scene, the normal speed of the line
@@ -69,6 +76,17 @@ void FilmPointAdjoint::add_line(const FilmLineSample& line, const Rgb<double>& j
     add_clip(line, weighed(adjoint_, jump) * share_ / line.density);
     return;
   }
+  const auto [a, b] = line.mesh->edge(line.edge.edge).vertices;
+  BoundaryForm form;
+  form.x = line.mesh->position(a) * (1 - line.t) + line.mesh->position(b) * line.t;
+  form.scale = 1 / line.density;
+  form.by = line.by;
+  form_ = &form;
+  if (line.by.through) {
+    form.add_edge(*line.mesh, line.edge, line.t, line.g);
+    add(jump);
+    return;
+  }
   Camera camera = motion_.scene().camera;
   for (const FaceRef face : line.by.all()) {
     const Mesh& mesh = motion_.scene().shape(face.shape).mesh;
@@ -76,18 +94,12 @@ void FilmPointAdjoint::add_line(const FilmLineSample& line, const Rgb<double>& j
     camera = image_of(camera, at_rest(MirrorPlane<double>::through(corners)));
   }
   const CameraView<Dual> view = CameraView<Dual>(camera).at(place_.lens);
-  const auto [a, b] = line.mesh->edge(line.edge.edge).vertices;
-  BoundaryForm form;
-  form.x = line.mesh->position(a) * (1 - line.t) + line.mesh->position(b) * line.t;
   const Vec3<Dual> x{{form.x.x, {1, 0, 0, 0}}, {form.x.y, {0, 1, 0, 0}}, {form.x.z, {0, 0, 1, 0}}};
   form.distance = length(form.x - value(view.start_of(x)));
-  form.scale = 1 / line.density;
-  form.by = line.by;
   const auto at = view.project(x);
   Vec3d g;
   for (int k = 0; k < 3; ++k) g[k] = line.nx * at.x.d[k] + line.ny * at.y.d[k];
   form.add_edge(*line.mesh, line.edge, line.t, g);
-  form_ = &form;
   add(jump);
 }
 

@@ -24,6 +24,25 @@ Rgb<double> reflectance(const Shape& shape, bool front) {
   return mirrored_share({rays.data(), static_cast<size_t>(count)}, n, n);
 }
 
+// Of what a side refracts along its normal: the share of light, and the index beyond.
+struct Refraction {
+  double share = 0, index = 0;
+};
+Refraction refraction_of(const Shape& shape, bool front) {
+  const Bsdf* side = shape.bsdf->side(front);
+  Refraction result;
+  if (!side || !side->lobes().smooth || !side->lobes().through) return result;
+  const Vec3d n{0, 0, 1}, wi = normalize(Vec3d{0x1p-8, 0, 1});  // straight on is another direction
+  SmoothRays<double> rays;
+  const auto count = static_cast<size_t>(side->smooth_rays(n, wi, rays));
+  for (const auto& ray : std::span(rays).first(count)) {
+    if (dot(ray.wo, n) >= 0 || ray.wo == -wi) continue;
+    result.share += luminance(ray.weight);
+    result.index = ray.eta;
+  }
+  return result.share > 0 ? result : Refraction{};
+}
+
 // Whether shading normals are those of the face.
 bool is_flat(const Mesh& mesh, FaceId face, const Vec3d& n) {
   if (mesh.normal_source == NormalSource::kFace) return true;
@@ -80,7 +99,7 @@ std::unique_ptr<const FlatMirrors> FlatMirrors::make(const Scene& scene) {
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) result->add_shape(ShapeId(s), mirrors);
   if (mirrors.empty()) return nullptr;
   std::stable_sort(mirrors.begin(), mirrors.end(), [](const Mirror& a, const Mirror& b) {
-    return a.area * a.share > b.area * b.share;
+    return a.area * std::max(a.share, a.passes) > b.area * std::max(b.share, b.passes);
   });
   if (mirrors.size() > kMost) mirrors.erase(mirrors.begin() + kMost, mirrors.end());
   const auto count = static_cast<uint32_t>(mirrors.size());
@@ -90,14 +109,36 @@ std::unique_ptr<const FlatMirrors> FlatMirrors::make(const Scene& scene) {
       if (a != b) result->chains_.push_back({{a, b}, 2});
     }
   }
+  for (uint32_t a = 0; a < count; ++a) {
+    if (mirrors[a].passes > 0) result->panes_.push_back({{a, 0}, 1, true});
+  }
+  for (uint32_t a = 0; a < count; ++a) {
+    for (uint32_t b = 0; b < count; ++b) {
+      const bool parallel =
+          length(cross(value(mirrors[a].plane.n), value(mirrors[b].plane.n))) <= kFlat;
+      if (a != b && parallel && mirrors[a].passes > 0 && mirrors[b].passes > 0)
+        result->panes_.push_back({{a, b}, 2, true});
+    }
+  }
   return result;
+}
+
+bool FlatMirrors::has(const Chain& chain) const {
+  const auto& of = chain.through ? panes_ : chains_;
+  return std::find(of.begin(), of.end(), chain) != of.end();
+}
+
+double FlatMirrors::refraction(uint32_t mirror, bool front) const {
+  return refraction_of(scene_.shape(mirrors_[mirror].faces[0].shape), front).index;
 }
 
 void FlatMirrors::add_shape(ShapeId id, std::vector<Mirror>& found) const {
   const Shape& shape = scene_.shape(id);
   const double share =
       std::max(luminance(reflectance(shape, true)), luminance(reflectance(shape, false)));
-  if (!(share > 0)) return;
+  const double passes =
+      std::max(refraction_of(shape, true).share, refraction_of(shape, false).share);
+  if (!(share > 0 || passes > 0)) return;
   const Scale scale(shape.mesh);
   const size_t first = found.size();
   for (uint32_t f = 0; f < shape.mesh.faces.size(); ++f) {
@@ -112,7 +153,8 @@ void FlatMirrors::add_shape(ShapeId id, std::vector<Mirror>& found) const {
     auto mirror =
         std::find_if(found.begin() + static_cast<std::ptrdiff_t>(first), found.end(), lies_in);
     if (mirror == found.end())
-      mirror = found.insert(mirror, {MirrorPlane<Dual>::through(corners), {}, {}, 0, share});
+      mirror =
+          found.insert(mirror, {MirrorPlane<Dual>::through(corners), {}, {}, 0, share, passes});
     mirror->faces.push_back({id, FaceId(f)});
     const Vec3d middle = value(corners[0] + corners[1] + corners[2]) / 3.0;
     const double size = 0.5 * length(area);

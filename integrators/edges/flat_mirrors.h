@@ -4,7 +4,7 @@
 // the mirror, in the direction M w of p's own direction w, M = 1 - 2 n n^T. M keeps lengths and
 // angles, so all that is known of edges that p sees holds for those that p* sees; only the segments
 // from p to the mirror and from there to the edge tell what hides them. In a chain of mirrors the
-// images are taken one after the other.
+// images are taken one after the other. Planes that refract are seen through (flat_layers.h).
 #include <array>
 #include <cstdint>
 #include <memory>
@@ -48,12 +48,15 @@ class FlatMirrors {
     std::vector<FaceRef> faces;
     Vec3d center{};  // of the faces, by their areas
     double area = 0;
-    double share = 0;  // of light that it reflects, along its normal
+    double share = 0;   // of light that it reflects, along its normal
+    double passes = 0;  // that it refracts
   };
   // In the order in which a path from the viewer meets them.
   struct Chain {
     std::array<uint32_t, kLongest> mirrors{};
     uint32_t count = 0;
+    bool through = false;  // it is refracted by all of them, else reflected
+    bool operator==(const Chain&) const = default;
   };
 
   // scene: with its parameters seeded; it must outlive this. Null where there is no such part.
@@ -62,6 +65,10 @@ class FlatMirrors {
   std::span<const Mirror> mirrors() const { return mirrors_; }
   // Of one mirror each, then of two different ones.
   std::span<const Chain> chains() const { return chains_; }
+  // Of one plane each that refracts, then of two parallel ones.
+  std::span<const Chain> panes() const { return panes_; }
+  // Whether a chain is one of all these.
+  bool has(const Chain& chain) const;
   // Which mirror a face belongs to; kNone.
   static constexpr uint32_t kNone = UINT32_MAX;
   uint32_t of(FaceRef face) const;
@@ -69,6 +76,9 @@ class FlatMirrors {
   MirrorPlane<double> plane(uint32_t mirror) const;
   // Whether a point is on a side of the mirror that reflects.
   bool reflects_to(uint32_t mirror, const Vec3d& p) const;
+  // The index of refraction beyond the plane over that before it, as seen from its front or back; 0
+  // if it refracts nothing.
+  double refraction(uint32_t mirror, bool front) const;
 
  private:
   explicit FlatMirrors(const Scene& scene) : scene_(scene) {}
@@ -76,18 +86,19 @@ class FlatMirrors {
 
   const Scene& scene_;
   std::vector<Mirror> mirrors_;
-  std::vector<Chain> chains_;
+  std::vector<Chain> chains_, panes_;
 };
 
-// The faces of a chain's mirrors on which a ray was reflected.
+// The faces of a chain's mirrors on which a ray was reflected, or refracted.
 struct MirrorFaces {
   std::array<FaceRef, FlatMirrors::kLongest> faces;
   uint32_t count = 0;
+  bool through = false;
 
   std::span<const FaceRef> all() const { return {faces.data(), count}; }
 };
 
-// The image of a ray. corners: gives those of a face, in S.
+// The image of a ray that is reflected. corners: gives those of a face, in S.
 template <class S, class Corners>
 void reflect_ray(const MirrorFaces& by, const Corners& corners, Vec3<S>& origin,
                  Vec3<S>& direction) {

@@ -28,22 +28,28 @@ inline bool PathTracer<S, Visitor>::turns_smoothly(Walk& walk) const {
 }
 
 // Whether the edges that the smooth ray wo sees are in no term: the path has come otherwise than
-// straight on or by a chain of flat mirrors.
+// straight on, by a chain of flat mirrors or, for a camera, through flat glass.
 template <class S, class Visitor>
 inline bool PathTracer<S, Visitor>::hides_edges(Walk& walk, const Vec3d& wo) const {
   if (walk.step.pdf > 0) {
-    walk.mirrors = 0;
+    walk.chain = {};
     walk.was_rough = true;
   }
   if (goes_straight(value(walk.wi), wo)) return false;
+  const FlatMirrors* const mirrors = c_.flat_mirrors;
   // Shadows of delta lights are seen straight on alone.
-  if (!c_.scene.delta_lights.empty()) return true;
+  if (!mirrors || !c_.scene.delta_lights.empty()) return true;
+  FlatMirrors::Chain& chain = walk.chain;
+  const bool through = walk.scattering->passes(wo);
+  const uint32_t mirror = mirrors->of(walk.surface.face);
+  if (mirror == FlatMirrors::kNone || chain.count == FlatMirrors::kLongest) return true;
+  if (chain.count > 0 && through != chain.through) return true;
+  chain.mirrors[chain.count++] = mirror;
+  chain.through = through;
   const Vec3d n = walk.scattering->front() ? walk.surface.n_g : -walk.surface.n_g;
-  if (!c_.flat_mirrors || ++walk.mirrors > FlatMirrors::kLongest) return true;
-  // From the camera, where that is not a pinhole.
-  return (!walk.was_rough && !c_.scene.camera.is_pinhole()) ||
-         !is_mirrored(n, value(walk.wi), wo) ||
-         c_.flat_mirrors->of(walk.surface.face) == FlatMirrors::kNone;
+  // The camera sees them if it is a pinhole; vertices see nothing refracted.
+  const bool sees = walk.was_rough ? !through : c_.scene.camera.is_pinhole();
+  return !sees || (!through && !is_mirrored(n, value(walk.wi), wo)) || !mirrors->has(chain);
 }
 
 // Along the smooth ray that was chosen; false where the path ends. Its direction moves with the

@@ -6,6 +6,7 @@
 #include <type_traits>
 
 #include "integrators/edges/edge_sides.h"
+#include "integrators/edges/flat_mirrors.h"
 #include "integrators/lights/mirrored_light.h"
 #include "integrators/paths/direction_field.h"
 #include "limn/core/lights.h"
@@ -54,12 +55,12 @@ struct Walk {
   SurfacePoint<S> surface;
   Vec3<S> wi;
   Rgb<S> throughput = grey(S(1.0));
-  double albedo = 1;        // bounds it, by the materials of PathContext::unmoved
-  double eta = 1;           // the index of refraction here over that where it started
-  uint32_t mirrors = 0;     // flat ones that it has come by since it was last rough, if smooth
-  bool was_rough = false;   // before a smooth lobe
-  ShapeId turned_by;        // the first shape whose smooth lobe hid edges (hides_edges), if any
-  Rgb<double> before_turn;  // what it had found until there
+  double albedo = 1;         // bounds it, by the materials of PathContext::unmoved
+  double eta = 1;            // the index of refraction here over that where it started
+  FlatMirrors::Chain chain;  // by which it has come since it was last rough, if smooth
+  bool was_rough = false;    // before a smooth lobe
+  ShapeId turned_by;         // the first shape whose smooth lobe hid edges (hides_edges), if any
+  Rgb<double> before_turn;   // what it had found until there
   PathStep step;
   PathSums<S> sums;
 

@@ -109,6 +109,7 @@ struct FilmLineSample {
   EdgeRef edge = {};
   double t = 0;  // on the edge, or the segment
   MirrorFaces by = {};
+  Vec3d g = {};  // where panes refract it: its speed per velocity of the edge's point
 };
 
 // A sink of samples of the film: v_ray is that of the camera's ray through a fixed film position.

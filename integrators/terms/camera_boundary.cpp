@@ -43,6 +43,7 @@ class CameraTerm final : public Term {
     FilmLineSample line{edge.nx, edge.ny, speed, point.density};
     line.t = edges_->t_of(point);
     line.by = by;
+    line.g = point.refracted.g;
     if (edge.clip == FilmEdge::kNoClip) {
       line.mesh = &input_.object(edge.id.object);
       line.edge = edge.id;

@@ -13,6 +13,9 @@ constexpr double kPieceLength = 2;
 // The share of its motion against all pixels around it in how likely a piece is drawn; the rest
 // goes by those that see its middle. Not tuned.
 constexpr double kAllAround = 0.1;
+// The weight, beside that of a parameter, of edges seen through panes, which are alike in it. Not
+// tuned.
+constexpr double kAlike = 0.1;
 
 Lanes larger(const Lanes& a, const Lanes& b) {
   Lanes result;
@@ -103,6 +106,10 @@ void CameraEdges::list() {
   edges_.clear();
   for (uint32_t v = 0; v < views_.size(); ++v) {
     const size_t first = edges_.size();
+    if (views_[v].refracted) {
+      for (uint32_t o = 0; o < input_.objects.size(); ++o) add_refracted(ShapeId(o), v);
+      continue;
+    }
     const CameraView<Dual> view(views_[v].camera);
     for (uint32_t o = 0; o < input_.objects.size(); ++o) add_object(ShapeId(o), v, view);
     if (v == 0) {
@@ -180,6 +187,35 @@ void CameraEdges::add_object(ShapeId object, uint32_t index, const CameraView<Du
   }
 }
 
+// By its motion at some places: it may move at others alone.
+void CameraEdges::add_refracted(ShapeId object, uint32_t index) {
+  constexpr int kPlaces = 4;  // not tuned
+  const FilmView& view = views_[index];
+  const EdgeMesh& mesh = input_.object(object);
+  for (uint32_t e = 0; e < mesh.edges.size(); ++e) {
+    FilmEdge edge;
+    edge.id = {object, EdgeId(e)};
+    edge.view = index;
+    edge.refracted = true;
+    edge.t0 = 0, edge.t1 = 1, edge.depth0 = edge.depth1 = 1;
+    const auto [v0, v1] = mesh.edge(edge.id.edge).vertices;
+    if (view.touches_mirror(mesh.faces_around(edge.id.edge)) ||
+        !view.refracted->clip(mesh.position(v0), mesh.position(v1), edge.t0, edge.t1)) {
+      continue;
+    }
+    edge.length = 1;
+    for (int i = 0; i < kPlaces; ++i) {
+      const double t = edge.t0 + (edge.t1 - edge.t0) * (i + 0.5) / kPlaces;
+      const auto seen = view.refracted->see(mesh, edge.id.edge, t);
+      if (!seen || !view.window.holds(seen->at)) continue;
+      for (int k = 0; k < lanes_; ++k) {
+        edge.speed0[k] += std::fabs(seen->speed[k]) * seen->stretch * (edge.t1 - edge.t0) / kPlaces;
+      }
+    }
+    edges_.push_back(edge);
+  }
+}
+
 void CameraEdges::add_clip(uint32_t index) {
   FilmEdge edge;
   if (place(index, CameraView<Dual>(views_[0].camera), edge)) add(edge, {&clips_[index].face, 1});
@@ -221,12 +257,17 @@ void CameraEdges::weigh(const FilmMotionAt& motion) {
   choice_ = {};
   for (uint32_t e = 0; e < edges_.size(); ++e) add_pieces(e, motion);
   Lanes totals;
-  for (const Piece& piece : pieces_) totals += piece.weight;
+  size_t refracted = 0;
+  for (const Piece& piece : pieces_) {
+    totals += piece.weight;
+    refracted += edges_[piece.edge].refracted;
+  }
   for (const Piece& piece : pieces_) {
     double share = 0;
     for (int k = 0; k < lanes_; ++k) {
       if (totals[k] > 0) share += piece.weight[k] / totals[k];
     }
+    if (edges_[piece.edge].refracted) share += kAlike / static_cast<double>(refracted);
     choice_.add(share);
   }
 }
@@ -237,10 +278,28 @@ std::optional<FilmEdgePoint> CameraEdges::choose(double u, const LensPoint&) con
   FilmEdgePoint point{edges_[piece.edge], 0, {}, 0};
   const FilmEdge& edge = point.edge;
   point.s = piece.s0 + (piece.s1 - piece.s0) * draw.fraction;
+  if (edge.refracted) {
+    if (!bend(point)) return {};
+    point.density = draw.probability / (point.refracted.stretch * (edge.t1 - edge.t0));
+    return point;
+  }
   point.at.x = edge.x0 + (edge.x1 - edge.x0) * point.s;
   point.at.y = edge.y0 + (edge.y1 - edge.y0) * point.s;
   point.density = draw.probability / (edge.length * (piece.s1 - piece.s0));
   return point;
+}
+
+// Puts a point onto the curve that is seen of its edge.
+bool CameraEdges::bend(FilmEdgePoint& point) const {
+  FilmEdge& edge = point.edge;
+  const EdgeMesh& mesh = input_.object(edge.id.object);
+  const auto seen = views_[edge.view].refracted->see(mesh, edge.id.edge, t_of(point));
+  if (!seen) return false;
+  point.refracted = *seen;
+  point.at = {seen->at, {}};
+  edge.nx = seen->nx, edge.ny = seen->ny;
+  edge.speed0 = edge.speed1 = seen->speed;
+  return true;
 }
 
 // By way of mirrors the edge is where the camera's image sees it; rays tell what hides it.
@@ -256,7 +315,8 @@ bool CameraEdges::jump_at(const FilmEdgePoint& point, const Rng& key, RayCount& 
   const LightOrigin image = edge.in_line ? view.viewpoint->aside(y)
                                          : view.viewpoint->seeing(mesh.around(edge.id.edge), y);
   const Camera& camera = scene().camera;
-  Ray ray = unfolded(*view.mirrors, view.chain, value(image.v), y);
+  Ray ray{value(camera.origin), point.refracted.towards};
+  if (!edge.refracted) ray = unfolded(*view.mirrors, view.chain, value(image.v), y);
   const double cosine = dot(ray.direction, value(camera.forward));
   ray.t_min = camera.near_clip / cosine;
   ray.t_max = camera.far_clip / cosine;

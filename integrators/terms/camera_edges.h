@@ -23,9 +23,12 @@ class CameraEdges final : public FilmEdges {
                MirrorFaces& by) const override;
 
  private:
-  static bool moves(const FilmEdge& edge) { return !is_zero(edge.speed0) || !is_zero(edge.speed1); }
+  static bool moves(const FilmEdge& edge) {
+    return edge.refracted || !is_zero(edge.speed0) || !is_zero(edge.speed1);
+  }
   void list();
   void add_object(ShapeId object, uint32_t view, const CameraView<Dual>& camera);
+  void add_refracted(ShapeId object, uint32_t view);
   void add_clip(uint32_t index);
   // faces: that the edge moves with.
   void add(const FilmEdge& edge, std::span<const FaceRef> faces) {
@@ -39,6 +42,7 @@ class CameraEdges final : public FilmEdges {
   bool may_move(const FilmEdge& edge, std::span<const FaceRef> faces) const;
   // Of the edges from the first on, of one view.
   void find_in_line(size_t first);
+  bool bend(FilmEdgePoint& point) const;
   void keep_seen(const FilmRegions& visible);
   void weigh(const FilmMotionAt& motion);
   void add_pieces(uint32_t edge, const FilmMotionAt& motion);

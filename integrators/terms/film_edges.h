@@ -22,6 +22,7 @@ struct FilmEdge : FilmLine {
   static constexpr uint32_t kNoClip = UINT32_MAX;
   uint32_t clip = kNoClip;  // the clip segment that it is, in the place of an edge
   uint32_t view = 0;        // by which flat mirrors it is seen, see CameraEdges; 0: by none
+  bool refracted = false;   // a curve: its ends are not on the film
   double t0, t1;            // the part of the edge that may reach the film: its ends
   Lanes speed0, speed1;     // v_n there [pixels]; n points to the positive side of EdgeView::side
   std::optional<FaceRef> beside = {};  // FilmRegions::SeenPart; none: a ray tells
@@ -34,6 +35,7 @@ struct FilmEdgePoint {
   double s;        // position on the film: (1 - s) of its first end and s of the other
   FilmPlace at;    // on the film, and of the lens
   double density;  // [1 / pixel of length]
+  RefractedPoint refracted = {};  // where panes refract it
 };
 
 // What moves where no motion is known: of these shapes every vertex by itself, and perhaps the

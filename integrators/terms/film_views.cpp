@@ -86,6 +86,14 @@ std::vector<FilmView> list_film_views(const PathContext& context, bool held) {
     view.viewpoint = view.own_viewpoint.get();
     views.push_back(std::move(view));
   }
+  for (const FlatMirrors::Chain& chain : context.flat_mirrors->panes()) {
+    auto refracted = std::make_unique<const RefractedView>(context, chain, held);
+    const FlatMirrors::Mirror& plane = context.flat_mirrors->mirrors()[chain.mirrors[0]];
+    const auto window = window_of(scene, plane, scene.camera, views[0].window);
+    if (!window || !refracted->is_seen()) continue;
+    views.push_back({chain, scene.camera, &context.viewpoints->camera, nullptr, *window,
+                     context.flat_mirrors, std::move(refracted)});
+  }
   return views;
 }
 

@@ -8,16 +8,17 @@
 #include "integrators/edges/flat_mirrors.h"
 #include "integrators/edges/viewpoint.h"
 #include "integrators/paths/path_context.h"
+#include "integrators/terms/refracted_view.h"
 
 namespace limn {
-
-// Cuts the parameter range [s0, s1] of a + s d to where it lies in [lower, upper] (Liang and
-// Barsky). False if nothing is left.
-bool clip_range(double a, double d, double lower, double upper, double& s0, double& s1);
 
 // A part of the film [pixels].
 struct FilmWindow {
   double x0, y0, x1, y1;
+
+  bool holds(const FilmPosition& at) const {
+    return at.x >= x0 && at.x <= x1 && at.y >= y0 && at.y <= y1;
+  }
 
   // Cuts the segment from (from_x, from_y) to (to_x, to_y) likewise.
   bool clip(double from_x, double to_x, double from_y, double to_y, double& s0, double& s1) const {
@@ -37,6 +38,7 @@ struct FilmView {
   FilmWindow window;                                         // no more than this is seen
   // Of an edge only what lies on the side of the last mirror that this is not on is seen.
   const FlatMirrors* mirrors = nullptr;
+  std::unique_ptr<const RefractedView> refracted = nullptr;  // in the place of an image
 
   bool direct() const { return chain.count == 0; }
   uint32_t last_mirror() const { return chain.mirrors[chain.count - 1]; }
@@ -50,8 +52,8 @@ struct FilmView {
   bool clip_to_mirror(const Vec3d& a, const Vec3d& b, double& t0, double& t1) const;
 };
 
-// The camera, then its images in chains of mirrors that may show it something. held: the mirrors'
-// motion is left out.
+// The camera, then its images in chains of mirrors that may show it something, then what it sees
+// through panes. held: the mirrors' motion is left out.
 std::vector<FilmView> list_film_views(const PathContext& context, bool held);
 
 }  // namespace limn

@@ -1,11 +1,6 @@
 // Rays along chains of flat mirrors.
 #include "integrators/terms/mirror_sight.h"
 
-#include <algorithm>
-
-#include "integrators/paths/straight_way.h"
-#include "limn/core/shading.h"
-
 namespace limn {
 
 Ray unfolded(const FlatMirrors& mirrors, const FlatMirrors::Chain& chain, const Vec3d& image,
@@ -40,12 +35,29 @@ bool meet_mirror(const PathContext& context, uint32_t mirror, Ray& ray, RayCount
   return false;
 }
 
+// What is refracted there, of weight 0 if nothing is.
+SmoothRay<double> through(const Scattering<double>& scattering) {
+  const auto k = refracted_ray(scattering);
+  return k ? scattering.smooth_ray(*k) : SmoothRay<double>{};
+}
+
+// What is reflected as by a mirror.
+SmoothRay<double> back(const Scattering<double>& scattering, const SurfacePoint<double>& surface) {
+  const Vec3d wi = scattering.wi(), n = scattering.front() ? surface.n_g : -surface.n_g;
+  SmoothRays<double> smooth;
+  const int count = std::min(scattering.shares().count, kMostSmoothRays);
+  for (int i = 0; i < count; ++i) smooth[i] = scattering.smooth_ray(i);
+  return {n * (2 * dot(n, wi)) - wi,
+          mirrored_share({smooth.data(), static_cast<size_t>(count)}, n, wi)};
+}
+
 }  // namespace
 
 bool follow_mirrors(const PathContext& context, const FlatMirrors::Chain& chain, Ray ray,
                     int bounces, RayCount& rays, MirrorSight& sight) {
   const Scene& scene = context.scene;
   sight.by = {};
+  sight.by.through = chain.through;
   sight.share = grey(1.0);
   sight.bounces = bounces;
   for (uint32_t k = 0; k < chain.count; ++k) {
@@ -56,17 +68,13 @@ bool follow_mirrors(const PathContext& context, const FlatMirrors::Chain& chain,
     const auto surface = surface_on_ray<double>(scene, face, ray.origin, ray.direction);
     const Scattering<double> scattering(surface, -ray.direction, scene.shading);
     if (scattering.black() || !scattering.is_smooth()) return false;
-    const Vec3d wi = scattering.wi();
-    SmoothRays<double> smooth;
-    const int count = std::min(scattering.shares().count, kMostSmoothRays);
-    for (int i = 0; i < count; ++i) smooth[i] = scattering.smooth_ray(i);
-    const Vec3d n = scattering.front() ? surface.n_g : -surface.n_g;
-    sight.share = sight.share * mirrored_share({smooth.data(), static_cast<size_t>(count)}, n, wi);
+    const SmoothRay<double> on = chain.through ? through(scattering) : back(scattering, surface);
+    sight.share = sight.share * on.weight;
     if (is_black(sight.share)) return false;
     sight.by.faces[sight.by.count++] = face;
     sight.from = surface.p;
     ++sight.bounces;
-    ray = {surface.p, n * (2 * dot(n, wi)) - wi};
+    ray = {surface.p, on.wo};
     ray.start = surface.start();
   }
   return true;

@@ -21,7 +21,6 @@ inline bool has_delta_lights(const Scene& scene) { return !scene.delta_lights.em
 // held, so a surface point moves with its own vertices or, where a path from a moving camera or a
 // smooth lobe slides over it, with these. Delta lights move the shadows of edges alone.
 inline bool by_any_change(const Moved&) { return true; }
-inline bool by_motion_on_film(const Moved& moved) { return moved.vertices || moved.camera; }
 inline bool by_motion_in_view(const Moved& moved) {
   return moved.vertices || moved.camera || moved.rays;
 }
@@ -34,7 +33,7 @@ inline constexpr TermType kTermTypes[] = {
     {"interior", "derivative of the integrand away from discontinuities", 1, true, false, true, 0,
      always, by_any_change, false, false, make_interior_term},
     {"camera", "silhouettes as the camera sees them", kLeastFilmSamples, false, true, false, 0,
-     always, by_motion_on_film, false, false, make_camera_term},
+     always, by_motion_in_view, false, false, make_camera_term},
     {"boundary", "silhouettes as path vertices see them", 1, false, true, true, 0, always,
      by_motion_in_view, false, false, make_boundary_term},
     {"shadow", "edges of the hard shadows of delta lights", 1, false, true, true, 1,

@@ -1,5 +1,5 @@
 // Reverse mode, term by term, against closed forms of edges that no other test of it has: inside of
-// faces, in mirrors and behind masks.
+// faces, in mirrors, behind masks and glass.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -68,7 +68,8 @@ TEST_P(ClosedFormBackward, IsExact) {
 INSTANTIATE_TEST_SUITE_P(, ClosedFormBackward,
                          testing::Values("board_in_sky", "seam_in_sky", "board_in_gloss",
                                          "square_in_mirror", "lamp_in_mirror", "lamps_behind_mask",
-                                         "lamp_behind_mask"),
+                                         "lamp_behind_mask", "lamps_under_water",
+                                         "lamps_through_pane"),
                          [](const auto& test) { return std::string(test.param); });
 
 }  // namespace

@@ -74,6 +74,72 @@ TEST(FlatMirrorsBackward, AgreesWithForwardMode) {
   }
 }
 
+// A ball and a cube that emit, one before the other, behind two planes of a slab of glass, which has
+// no sides and reflects nothing. The camera also looks past it.
+Scene behind_slab(const TempFiles& files, const std::string& body = "") {
+  SceneParts parts;
+  parts.max_depth = 3;
+  parts.origin = {0.6, 0.9, 3.5};
+  parts.target = {0, 0.3, 0};
+  parts.fov = 30;
+  const std::string slab = files.write("slab.obj",
+                                       "v -1 -0.8 1.5\nv 0.4 -0.8 1.25\nv 0.4 0.8 1.25\n"
+                                       "v -1 0.8 1.5\nv -1 -0.8 1.1\nv 0.4 -0.8 0.85\n"
+                                       "v 0.4 0.8 0.85\nv -1 0.8 1.1\nf 1 2 3 4\nf 8 7 6 5\n");
+  const std::string glass = R"(<bsdf type="dielectric" id="glass">
+      <rgb name="specular_reflectance" value="0"/></bsdf>)";
+  parts.body = obj_shape("slab", slab, true, 1, {0, 0, 0}, glass) +
+               obj_shape("ball", write_mesh(files, "ball.obj", icosphere_mesh(1)), false, 0.4,
+                         {0.1, 0.3, 0}, area_light("red", "3, 1, 0.5")) +
+               R"(<shape type="cube" id="cube"><transform name="to_world"><scale value="0.4"/>
+         <rotate y="1" angle="30"/><translate x="-0.4" y="0.3" z="-1"/></transform>)" +
+               area_light("blue", "0.5, 1, 3") + "</shape>" +
+               constant_light("sky", "0.2, 0.3, 0.4") + body;
+  return make_scene(files, parts);
+}
+
+class FlatGlassInView : public testing::TestWithParam<std::string> {};
+
+TEST_P(FlatGlassInView, Agrees) {
+  const TempFiles files;
+  const CheckResult r = run_check(behind_slab(files), GetParam(), 512);
+  EXPECT_GT(r.windows.count, 0);
+  EXPECT_NE(r.verdict, Verdict::kDisagree) << "suspect " << r.suspect;
+  EXPECT_FALSE(r.gradient.incomplete);
+}
+
+INSTANTIATE_TEST_SUITE_P(, FlatGlassInView,
+                         testing::Values("ball.translate.x", "cube.rotate.y", "slab.rotate.y",
+                                         "slab.translate.x", "sensor.translate.x",
+                                         "sensor.rotate.x", "glass.eta"),
+                         [](const auto& test) {
+                           std::string name = test.param;
+                           std::replace(name.begin(), name.end(), '.', '_');
+                           return name;
+                         });
+
+TEST(FlatGlassBackward, AgreesWithForwardMode) {
+  const TempFiles files;
+  RunSettings settings;
+  settings.spp = 256;
+  settings.seed = 3;
+  BackwardOptions options;
+  options.parameters = {"ball.translate.x", "slab.rotate.y", "sensor.translate.y", "glass.eta"};
+  for (const ReverseCheck& r : check_reverse(behind_slab(files), options, settings)) {
+    EXPECT_LT(std::fabs(r.z), 4.5) << r.parameter << ": " << r.forward << " +- " << r.forward_error
+                                   << ", " << r.reverse << " +- " << r.reverse_error;
+  }
+}
+
+// What rough surfaces see through glass is missing.
+TEST(FlatGlass, ShowsEdgesToTheCameraAlone) {
+  const TempFiles files;
+  const Scene scene =
+      behind_slab(files, square("floor", 2, -90, {0, -0.3, 0}, diffuse("ground", "0.5, 0.4, 0.3")));
+  const CheckResult result = run_check(scene, "ball.translate.x", 8);
+  EXPECT_TRUE(result.gradient.incomplete);
+}
+
 // Chains of three mirrors are left, and what curved ones show.
 TEST(FlatMirrors, WhatIsMissingIsTold) {
   const TempFiles files;

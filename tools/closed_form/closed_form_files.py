@@ -76,6 +76,9 @@ def bsdf_xml(bsdf):
     if bsdf.kind == "mirror":
         return (f'  <bsdf type="conductor" id="{bsdf.id}">\n    <rgb name="eta" value="0"/>'
                 f'<rgb name="k" value="1"/>{rgb("specular_reflectance", bsdf.reflectance)}\n  </bsdf>\n')
+    if bsdf.kind == "dielectric":
+        return (f'  <bsdf type="dielectric" id="{bsdf.id}"><float name="int_ior" value="{bsdf.eta:.12g}"/>'
+                f'<float name="ext_ior" value="1"/></bsdf>\n')
     if bsdf.kind == "mask":
         return (f'  <bsdf type="mask" id="{bsdf.id}"><float name="opacity" value="{bsdf.opacity:.9g}"/>\n'
                 f'    <bsdf type="diffuse"><rgb name="reflectance" value="0"/></bsdf>\n  </bsdf>\n')

@@ -34,7 +34,7 @@ class Shape:
 @dataclass
 class Bsdf:
     """kind: diffuse, ggx or beckmann (roughconductor with eta 0, k 1, so Fresnel = 1), mirror (a
-    conductor with these), or mask, of a black surface.
+    conductor with these), mask, of a black surface, or dielectric.
 
     colors: 2 by 3, of a checkerboard in the place of the reflectance; its squares are halves of uv.
     """
@@ -45,6 +45,7 @@ class Bsdf:
     alpha: float = 0.0
     colors: np.ndarray = None
     opacity: float = 0.0
+    eta: float = 1.0  # of a dielectric: inside over outside
 
 
 @dataclass
@@ -152,7 +153,7 @@ def moved(scene, name, step):
         move_camera(scene.camera, what, axis, step)
     elif owner in scene.lights:
         move_light(scene.lights[owner], what, axis, step)
-    elif what in ("reflectance", "specular_reflectance", "alpha", "opacity"):
+    elif what in ("reflectance", "specular_reflectance", "alpha", "opacity", "eta"):
         bsdf = next(s.bsdf for s in scene.shapes.values() if s.bsdf and s.bsdf.id == owner)
         if rest:  # color0 or color1
             bsdf.colors[int(rest[0][-1])] += step
@@ -223,6 +224,35 @@ def mirrored(points, loop):
     """The images of points (N by 3) in the plane of `loop`."""
     normal = loop_normal(loop)
     return points - 2 * ((points - loop[0]) @ normal)[:, None] * normal
+
+
+def through_layers(eye, points, planes, indices):
+    """Unit directions (N by 3) in which an eye sees points (N by 3) through parallel planes (loops, from
+    the eye on), behind which media have these indices; 1 before the first.
+
+    The tangent u in the thinnest medium makes the sum of h tan(theta) the distance across: bisection,
+    then Newton's method."""
+    normal = loop_normal(planes[0]) * np.sign(np.dot(planes[0][0] - eye, loop_normal(planes[0])))
+    depth = [0 * points[:, 0]] + [np.dot(p[0] - eye, normal) + 0 * points[:, 0] for p in planes]
+    heights = np.diff(np.stack(depth + [(points - eye) @ normal]), axis=0)
+    assert np.all(heights > 0)
+    across = (points - eye) - np.outer((points - eye) @ normal, normal)
+    distance = np.linalg.norm(across, axis=1)
+    ratios = min([1, *indices]) / np.array([1, *indices])[:, None]
+
+    def tangents(u):
+        return ratios * u / np.sqrt(1 + (1 - ratios**2) * u**2)
+
+    low, high = 0 * distance, distance / heights[np.argmax(ratios[:, 0])]
+    for _ in range(50):
+        middle = (low + high) / 2
+        below = np.sum(heights * tangents(middle), axis=0) < distance
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    u = (low + high) / 2
+    for _ in range(3):
+        slope = np.sum(heights * ratios / (1 + (1 - ratios**2) * u**2)**1.5, axis=0)
+        u = u + (distance - np.sum(heights * tangents(u), axis=0)) / slope
+    return unit(normal + across * (tangents(u)[0] / distance)[:, None])
 
 
 def hit_plane(camera, film, loop):

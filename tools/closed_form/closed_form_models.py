@@ -12,7 +12,8 @@ All three moved together give the picture of the moved scene, so the terms add u
 import numpy as np
 
 from closed_form_geometry import (clip, clip_box, clip_convex, hit_plane, loop_normal, loop_rule,
-                                  mirrored, ramp, shadow_on_plane, square_rule, squares, unit)
+                                  mirrored, ramp, shadow_on_plane, square_rule, squares,
+                                  through_layers, unit)
 from closed_form_radiance import (Filter, convex_vector, lobe, lobe_over_polygon, polygon_area,
                                   polygon_vector)
 
@@ -447,6 +448,58 @@ class LampsBehindMask:
                     + (shade.shapes["far"].radiance - sky) * shown)
 
         return pixels(camera, mean)
+
+
+def passed(camera, film, planes, indices):
+    """The share (N by 1) of radiance behind parallel planes of glass that arrives at film (N by 2)."""
+    cosine, share, before = np.abs(camera.directions(film) @ loop_normal(planes[0])), 1.0, 1.0
+    for index in indices:
+        eta = index / before
+        other = np.sqrt(1 - (1 - cosine**2) / eta**2)
+        parallel = (eta * cosine - other) / (eta * cosine + other)
+        across = (cosine - eta * other) / (cosine + eta * other)
+        share = share * (1 - (parallel**2 + across**2) / 2) / eta**2
+        cosine, before = other, index
+    return share[:, None]
+
+
+class LampsThroughGlass:
+    """Shapes "near" and "far" emit, in a pixel each, before black. The camera sees them through flat
+    faces of shape "glass", which it sees beyond the film's borders:
+    I = the integral over the lamps of L_e (1 - F) / eta^2 |ds / dA| dA, s their places on the film."""
+
+    outlines_in_view = True
+
+    def __init__(self, *faces):
+        self.faces = faces  # of "glass", from the camera on
+
+    def layers(self, scene):
+        glass = scene.shapes["glass"]
+        eta = glass.bsdf.eta
+        return [glass.face(k) for k in self.faces], [eta, 1][:len(self.faces)]
+
+    def film(self, scene, points):
+        eye = scene.camera.pinhole()
+        return scene.camera.project(eye + through_layers(eye, points, *self.layers(scene)))
+
+    def image(self, domain, shade, outline, shadow, order):
+        result = np.zeros((domain.camera.height, domain.camera.width, 3))
+        for name in ("near", "far"):
+            loop = domain.shapes[name].face(0)
+            points, weights = loop_rule(loop, 2 * order)
+            axis = unit(loop[1] - loop[0])
+            slopes, h = [], 2.0**-6
+            for step in (axis, np.cross(loop_normal(loop), axis)):
+                slopes.append(sum(w / h * (self.film(domain, points + k * h * step)
+                                           - self.film(domain, points - k * h * step))
+                                  for k, w in {1: 4 / 5, 2: -1 / 5, 3: 4 / 105, 4: -1 / 280}.items()))
+            size = np.abs(slopes[0][:, 0] * slopes[1][:, 1] - slopes[0][:, 1] * slopes[1][:, 0])
+            film = self.film(domain, points)
+            column, row = np.floor(film[0]).astype(int)
+            assert np.all(np.floor(film) == [column, row]), "a lamp is in several pixels"
+            share = passed(shade.camera, film, *self.layers(shade))
+            result[row, column] += (weights * size) @ share * shade.shapes[name].radiance
+        return result
 
 
 class CrossingInView:

@@ -205,6 +205,33 @@ def lamp_in_mirror():
     return scene, models.LampInMirror(), names
 
 
+def through_glass(name, glass, moves, max_depth, *faces):
+    camera = Camera(vector(0.25, 3, -1.5), vector(0.25, -1, 0.25), vector(0, 1, 0), 40, 2, 1)
+    near = lamp(parallelogram((-0.875, -1.25, 0), (0.125, 0.0625, 0.5), (0.75, -0.125, 0.0625)),
+                (3, 1, 0.5), "near")
+    angles = np.arange(8) * (np.pi / 4)
+    center, a, b = vector(0.9375, -1.5, 0.375), vector(0.125, 0.0625, 0.375), vector(0.375, 0, -0.125)
+    disc = np.round((center + np.outer(np.cos(angles), a) + np.outer(np.sin(angles), b)) * 256) / 256
+    disc[:, 1] = np.round((center[1] + (disc - center) @ vector(0, 0, 0.125)) * 4096) / 4096
+    far = lamp(Shape(disc, [list(range(8))]), (0.5, 2, 4), "far")
+    glass.bsdf = Bsdf("glass_bsdf", "dielectric", eta=1.3125)
+    scene = Scene(f"{name}.xml", camera, {"glass": glass, "near": near, "far": far}, max_depth)
+    names = SENSOR + moves_of("near") + moves_of("far")
+    names += ["near_emitter.radiance", "far_emitter.radiance", "glass_bsdf.eta"]
+    names += [f"glass.{move}" for move in moves]
+    return scene, models.LampsThroughGlass(*faces), names
+
+
+def lamps_under_water():
+    return through_glass("lamps_under_water",
+                         parallelogram((-8, -0.25, -8), (0, 0.5, 16), (16, 0.25, 0)), MOVES, 2, 0)
+
+
+def lamps_through_pane(name, height):
+    return through_glass(name, box((-8, -height, -8), (8, height, 8)),
+                         ["rotate.x", "rotate.z", "scale"], 3, 3, 2)
+
+
 def crossing_in_view():
     camera = Camera(vector(0.375, 0.5, -3.9375), vector(0.5, 0.25, -0.1875), vector(0, 1, 0), 30, 4,
                     4)
@@ -386,6 +413,9 @@ SCENES = {
     "lamp_in_mirror": lamp_in_mirror,
     "lamps_behind_mask": lamps_behind_mask,
     "lamp_behind_mask": lamp_behind_mask,
+    "lamps_under_water": lamps_under_water,
+    "lamps_through_pane": lambda: lamps_through_pane("lamps_through_pane", 0.5),
+    "lamps_through_thin_pane": lambda: lamps_through_pane("lamps_through_thin_pane", 1 / 64),
     "crossing_in_view": crossing_in_view,
     "crossing_over_plane": crossing_over_plane,
     "lamp_in_ggx": lambda: lamp_in_gloss("ggx", 0.1),
