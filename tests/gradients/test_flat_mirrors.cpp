@@ -74,8 +74,8 @@ TEST(FlatMirrorsBackward, AgreesWithForwardMode) {
   }
 }
 
-// A ball and a cube that emit, one before the other, behind two planes of a slab of glass, which has
-// no sides and reflects nothing. The camera also looks past it.
+// A ball and a cube that emit, one before the other, behind the two planes of a slab that has
+// no sides and reflects nothing; the camera also looks past it.
 Scene behind_slab(const TempFiles& files, const std::string& body = "") {
   SceneParts parts;
   parts.max_depth = 3;
