@@ -197,6 +197,7 @@ void CameraEdges::add_refracted(ShapeId object, uint32_t index) {
     edge.id = {object, EdgeId(e)};
     edge.view = index;
     edge.refracted = true;
+    edge.x0 = edge.x1 = edge.y0 = edge.y1 = 0;
     edge.t0 = 0, edge.t1 = 1, edge.depth0 = edge.depth1 = 1;
     const auto [v0, v1] = mesh.edge(edge.id.edge).vertices;
     if (view.touches_mirror(mesh.faces_around(edge.id.edge)) ||
@@ -278,13 +279,9 @@ std::optional<FilmEdgePoint> CameraEdges::choose(double u, const LensPoint&) con
   FilmEdgePoint point{edges_[piece.edge], 0, {}, 0};
   const FilmEdge& edge = point.edge;
   point.s = piece.s0 + (piece.s1 - piece.s0) * draw.fraction;
-  if (edge.refracted) {
-    if (!bend(point)) return {};
-    point.density = draw.probability / (point.refracted.stretch * (edge.t1 - edge.t0));
-    return point;
-  }
   point.at.x = edge.x0 + (edge.x1 - edge.x0) * point.s;
   point.at.y = edge.y0 + (edge.y1 - edge.y0) * point.s;
+  if (edge.refracted && !bend(point)) return {};
   point.density = draw.probability / (edge.length * (piece.s1 - piece.s0));
   return point;
 }
@@ -299,6 +296,7 @@ bool CameraEdges::bend(FilmEdgePoint& point) const {
   point.at = {seen->at, {}};
   edge.nx = seen->nx, edge.ny = seen->ny;
   edge.speed0 = edge.speed1 = seen->speed;
+  edge.length = seen->stretch * (edge.t1 - edge.t0);
   return true;
 }
 
