@@ -86,7 +86,7 @@ std::shared_ptr<Bsdf> make_diffuse(const ConstantOrTexture& reflectance) {
 std::shared_ptr<Bsdf> read_diffuse(Properties& properties) {
   // Mitsuba takes brighter texels with a warning, too, which the reader of the scene gives.
   return make_diffuse(
-      read_reflectance(properties, "reflectance", 0.5, std::numeric_limits<double>::max()));
+      read_reflectance(properties, "reflectance", 0.5, std::numeric_limits<double>::infinity()));
 }
 
 }  // namespace limn

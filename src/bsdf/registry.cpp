@@ -1,6 +1,8 @@
 // The table of BSDF types.
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "limn/core/names.h"
 #include "src/bsdf/types.h"
 
@@ -54,7 +56,10 @@ std::shared_ptr<Bsdf> make_bsdf(Properties& properties) {
 std::shared_ptr<Texture> read_texture(Properties& properties, const char* name, double most) {
   std::shared_ptr<Texture> texture = properties.texture(name);
   if (texture && !(texture->range().least >= 0 && texture->range().most <= most)) {
-    properties.fail(name, fmt::format("the values of the texture must lie in [0, {:g}]", most));
+    properties.fail(name, std::isinf(most) ? "the values of the texture must not be negative"
+                                           : fmt::format("the values of the texture must lie in "
+                                                         "[0, {:g}]",
+                                                         most));
   }
   return texture;
 }

@@ -259,11 +259,11 @@ TEST(Bitmap, NearestTexelsTakeNothingThatMoves) {
 TEST(Bitmap, WhatCannotBeIsRefused) {
   const TempFiles files;
   Image image(2, 1, 1);
-  image.data = {0.5f, 1.5f};
-  write_exr(files.path("bright.exr"), image, false, {});
-  EXPECT_EQ(message_of(bitmap(files.path("bright.exr"))),
-            "string:2:60: error: bsdf \"diffuse\": reflectance: the values of the texture must lie "
-            "in [0, 1]");
+  image.data = {0.5f, -0.5f};
+  write_exr(files.path("dark.exr"), image, false, {});
+  EXPECT_EQ(message_of(bitmap(files.path("dark.exr"))),
+            "string:2:60: error: bsdf \"diffuse\": reflectance: the values of the texture must not "
+            "be negative");
   image.data = {0.5f, std::nanf("")};
   write_exr(files.path("nan.exr"), image, false, {});
   EXPECT_EQ(message_of(bitmap(files.path("nan.exr"))),
