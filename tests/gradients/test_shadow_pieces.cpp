@@ -163,7 +163,7 @@ std::vector<EdgeQuery> queries_of(const Shadows& shadows) {
     queries.push_back(query);
   };
   add({0.3, 1, -1.5}, {0, 0, 1}, {0, 1, 1}, matt, {ShapeId(1), FaceId(0)});
-  add({-1, 0, 0.5}, {0, 1, 0}, {1, 1, 1}, gloss, {ShapeId(0), FaceId(0)});
+  add({-1, 0.4, 0.5}, {0, -1, 0}, {1, -1, 1}, gloss, {});
   const ShadowPiece& piece = shadows.pieces.pieces()[0];
   const ShadowEdge& edge = shadows.edges.edge(piece.edge);
   const EdgeMesh& mesh = shadows.input.object(edge.id.object);
