@@ -2,37 +2,15 @@
 #include "integrators/methods/radiance_estimator.h"
 
 #include <algorithm>
-#include <array>
 #include <utility>
 #include <vector>
 
-#include "integrators/paths/camera_path.h"
+#include "integrators/paths/film_rays.h"
 #include "integrators/paths/path_follow.h"
 #include "integrators/paths/path_log.h"
-#include "limn/core/check.h"
 
 namespace limn {
-namespace {
-
-// From which samples are placed on the film: of each its own, drawn at once.
-std::array<std::array<double, 2>, kMostTogether> film_numbers(
-    std::span<const KeyedSample> samples) {
-  Rng::Stream streams[kMostTogether];
-  for (size_t i = 0; i < samples.size(); ++i) streams[i] = {&samples[i].key, 0};
-  std::array<std::array<double, 2>, kMostTogether> numbers;
-  Rng::draw(Purpose::kFilm, {streams, samples.size()}, numbers.data());
-  return numbers;
-}
-
-// Whether any material is worth lanes.
-bool is_glossy(const Scene& scene) {
-  return std::ranges::any_of(scene.shapes, [](const Shape& shape) {
-    const auto is_ggx = [](const Bsdf* side) { return side && side->lobe().model == &ggx_lobe(); };
-    return is_ggx(shape.bsdf->side(true)) || is_ggx(shape.bsdf->side(false));
-  });
-}
-
-}  // namespace
+namespace {}  // namespace
 
 RadianceEstimator::RadianceEstimator(const Scene& scene, int threads,
                                      std::shared_ptr<const FilmRegions> visible, bool closed,
@@ -76,54 +54,30 @@ void RadianceEstimator::trace(std::span<const KeyedSample> samples, bool mirrore
                               Visitor* visitor, SampleSink& sink) const {
   using Tracer = PathTracer<double, Visitor>;
   static_assert(kMostTogether <= Tracer::kMostWalks);
-  RayCount rays;
-  Tracer tracer(traced_.context(), rays);
+  RayCount count;
+  Tracer tracer(traced_.context(), count);
   tracer.work_wide(glossy_);
-  DCHECK_LE(samples.size(), kMostTogether);
-  // Step by step for all of them, like the paths themselves (path.h).
-  const auto numbers = film_numbers(samples);
-  std::array<FilmPosition, kMostTogether> places;
-  for (size_t i = 0; i < samples.size(); ++i) {
-    const PixelSample& at = samples[i].at;
-    places[i] = sample_pixel_filter(scene_.film, filter_, at.x, at.y, numbers[i]);
-    if (mirrored) places[i] = mirrored_in_pixel(scene_.film, at.x, at.y, places[i]);
-  }
-  std::array<CameraRay<double>, kMostTogether> camera_rays;
-  if (scene_.camera.has_lens()) {
-    std::array<LensPoint, kMostTogether> lenses;
-    sample_lenses(scene_.camera, samples, lenses);
-    for (size_t i = 0; i < samples.size(); ++i) {
-      camera_rays[i] = ray_at(camera_, {places[i], lenses[i]});
-    }
-  } else {
-    find_rays(camera_, {places.data(), samples.size()}, camera_rays);
-  }
-  std::array<StartRay<double>, kMostTogether> starts;
-  for (size_t i = 0; i < samples.size(); ++i) {
-    const CameraRay<double>& ray = camera_rays[i];
-    renew(starts[i].ray, [&] { return camera_ray(scene_, ray); });
-    starts[i].origin = ray.origin;
-    starts[i].direction = ray.direction;
-  }
+  const FilmRays rays(scene_, camera_, filter_, samples, mirrored);
   std::vector<typename Tracer::Walk> walks;
   walks.reserve(samples.size());
   for (size_t i = 0; i < samples.size(); ++i) {
     walks.emplace_back(samples[i].key, 0, visitor);
     if (sink.log()) {
-      log_camera_ray(*sink.log(), places[i].x, places[i].y, starts[i].origin, starts[i].direction);
+      const StartRay<double>& start = rays.starts()[i];
+      log_camera_ray(*sink.log(), rays.place(i).x, rays.place(i).y, start.origin, start.direction);
     }
   }
   if (visible_) {
     std::vector<FaceRef> faces;
     for (size_t i = 0; i < samples.size(); ++i) {
       faces.push_back(
-          visible_->face_at(samples[i].at.x, samples[i].at.y, places[i].x, places[i].y));
+          visible_->face_at(samples[i].at.x, samples[i].at.y, rays.place(i).x, rays.place(i).y));
     }
-    tracer.follow_rays({starts.data(), walks.size()}, faces, walks);
+    tracer.follow_rays(rays.starts(), faces, walks);
   } else {
-    tracer.follow_rays({starts.data(), walks.size()}, walks);
+    tracer.follow_rays(rays.starts(), walks);
   }
-  sink.cost(0).add(rays);
+  sink.cost(0).add(count);
   sink.cost(0).samples += samples.size();
   add(walks, samples, weight, sink);
 }

@@ -16,6 +16,7 @@
 #include "integrators/edges/near_faces.h"
 #include "integrators/edges/viewpoint.h"
 #include "integrators/lights/closed_light.h"
+#include "integrators/paths/moving_colours.h"
 #include "integrators/paths/path_context.h"
 #include "integrators/paths/walk.h"
 #include "integrators/paths/warp_field.h"
@@ -36,7 +37,8 @@ template <class S, class Visitor>
 class PathTracer {
  public:
   using Walk = limn::Walk<S, Visitor>;
-  static constexpr bool kPlain = std::is_same_v<S, double>;
+  using Place = PlaceScalar<S, Visitor>;
+  static constexpr bool kPlain = std::is_same_v<Place, double>;
   // Side by side. With derivatives 1, 3 and 8 took 1.05, 1.02 and 1.01 of the time that a gradient
   // of the demo had taken path by path. Images with 32 and 64 took 0.97 to 0.98 of the time with
   // 16: fewer lanes stay empty as paths end.
@@ -44,16 +46,16 @@ class PathTracer {
 
   PathTracer(const PathContext& context, RayCount& rays) : c_(context), rays_(rays) {}
 
-  // By the fields of paths that have one. Must outlive the tracer. Only where S carries
+  // By the fields of paths that have one. Must outlive the tracer. Only where places carry
   // derivatives.
   void move_directions(const MotionRates& rates) {
-    static_assert(std::is_same_v<S, Dual>);
+    static_assert(std::is_same_v<Place, Dual>);
     rates_ = &rates;
   }
   // The directions of all vertices move from now on, on one path at a time. Must outlive the
   // tracer.
   void warp_directions(DirectionWarper& warper) {
-    static_assert(std::is_same_v<S, Dual>);
+    static_assert(std::is_same_v<Place, Dual>);
     warper_ = &warper;
   }
   // Takes more light samples and directions at vertices that slide fast. It must outlive the
@@ -68,16 +70,21 @@ class PathTracer {
     wide_ = true;
     scatters_wide_ = glossy;
   }
+  // Where colours alone carry derivatives: what has any. Must outlive the tracer.
+  void colour_by(const MovingColours& colours) {
+    static_assert(kColoursAlone<S, Visitor>);
+    colours_ = &colours;
+  }
   // How many light samples are averaged at every vertex but the first.
   void take_light_samples(int count) { light_samples_ = count; }
 
   // Radiance that arrives at the origins of rays against their directions; rays[i] belongs to
   // walks[i], at most kMostWalks of them. What cannot be traced has `failed`.
-  void follow_rays(std::span<const StartRay<S>> rays, std::span<Walk> walks);
+  void follow_rays(std::span<const StartRay<Place>> rays, std::span<Walk> walks);
   // The same where it is known what they meet: faces[i], or none.
-  void follow_rays(std::span<const StartRay<S>> rays, std::span<const FaceRef> faces,
+  void follow_rays(std::span<const StartRay<Place>> rays, std::span<const FaceRef> faces,
                    std::span<Walk> walks);
-  Rgb<S> escaped(const Vec3<S>& direction, int bounces) const;
+  Rgb<S> escaped(const Vec3<Place>& direction, int bounces) const;
 
   // A path that starts on a surface: the radiance that leaves it along wi, emission and everything
   // scattered within the scene's depth. With x_0 the surface, w_i a direction drawn at x_i with
@@ -88,7 +95,7 @@ class PathTracer {
   // l a direction that light sampling draws with density q_k, and m_k = p^2 / (p^2 + q^2) and
   // n_k = q^2 / (p^2 + q^2) the weights of the power heuristic at either's direction (n_k = 1 for a
   // delta light). w, l, p, q, m, n are constants when S carries derivatives.
-  void place(Walk& walk, const SurfacePoint<S>& surface, const Vec3<S>& wi) const;
+  void place(Walk& walk, const SurfacePoint<Place>& surface, const Vec3<Place>& wi) const;
   void follow_one(Walk& walk) {
     Walk* const one = &walk;
     follow({&one, 1});
@@ -97,6 +104,7 @@ class PathTracer {
   void follow(std::span<Walk* const> walks);
 
  private:
+  using Evaluation = typename Scattering<S>::Evaluation;
   template <class Step>
   static bool guarded(Walk& walk, const Step& step) {
     try {
@@ -115,23 +123,31 @@ class PathTracer {
     return c_.scene.environment && !(bounces == 0 && c_.scene.hide_emitters);
   }
   // path_follow.h
-  void place(Walk& walk, const Vec3<S>& wi) const;
-  void follow_seen(std::span<const StartRay<S>> rays, std::span<Walk> walks);
+  void place(Walk& walk, const Vec3<Place>& wi) const;
+  void follow_seen(std::span<const StartRay<Place>> rays, std::span<Walk> walks);
   void split(Walk& walk, int more);
   // path_vertices.h. Those that return bool say whether the path goes on.
   bool begin_vertex(Walk& walk);
   void draw_numbers(std::span<Walk* const> walks) const;
+  void colour(Walk& walk) const;
+  Evaluation evaluate(const Walk& walk, const Vec3d& wo, const DirectionMotion* motion,
+                      const Vec3<Place>& direction) const;
+  Evaluation coloured(const Walk& walk, const typename Scattering<Place>::Evaluation& evaluation,
+                      const Vec3d& wo) const;
+  template <class W>
+  Rgb<S> scattered_into(const Walk& walk, const Vec3<W>& wo) const;
+  SmoothRay<S> smooth_ray(const Walk& walk) const;
   bool goes_on(Walk& walk, double pdf) const;
   bool draw_mirrored(Walk& walk) const;
   bool choose_direction(Walk& walk);
   bool scatter(Walk& walk);
-  using Evaluation = typename Scattering<S>::Evaluation;
   bool scatter(Walk& walk, const Evaluation& evaluation);
   void escape(std::span<Walk* const> walks) const;
   void escape(Walk& walk) const;
+  Environment::Sight<S> sight(const Walk& walk) const;
   bool arrive(Walk& walk);
   void set_motion(Walk& walk) const;
-  int splits(const SurfacePoint<S>& surface, int copies) const;
+  int splits(const SurfacePoint<Place>& surface, int copies) const;
   Rgb<S> emitted(const Walk& walk) const;
   double unmoved_albedo(const Walk& walk) const;
   bool survives_roulette(Walk& walk) const;
@@ -153,13 +169,13 @@ class PathTracer {
   template <class Direction, class Then>
   void evaluate_wide(std::span<Walk*> walks, const Direction& direction, const Then& then) const;
   template <class Rest>
-  void see_sky_wide(std::span<const StartRay<S>> rays, std::span<Walk> walks,
+  void see_sky_wide(std::span<const StartRay<Place>> rays, std::span<Walk> walks,
                     const Rest& rest) const;
   // path_rays.h
   bool next_hit(Walk& walk);
   bool shadowed(const Walk& walk);
   std::optional<FaceSide> blocked_at_start(const Walk& walk, const Vec3d& direction) const;
-  void move_along_edge(SurfacePoint<S>& surface, FaceRef face, const Vec3d& direction) const;
+  void move_along_edge(SurfacePoint<Place>& surface, FaceRef face, const Vec3d& direction) const;
   void fetch_face(FaceRef face) const;
   void fetch_corners(const Walk& walk) const;
   void find_sky(std::span<Walk* const> walks) const;
@@ -175,6 +191,7 @@ class PathTracer {
   bool weigh_light(Walk& walk, const Evaluation& evaluation) const;
   void draw_delta(Walk& walk, const DeltaLight& delta) const;
   Rgb<S> light_value(const Walk& walk) const;
+  Rgb<S> drawn_radiance(const LightSample& light) const;
   Rgb<S> emitted(const Walk& walk, const DirectionMotion* motion) const;
   void add_light(Walk& walk) const;
   void add_lights(Walk& walk, int count);
@@ -190,6 +207,7 @@ class PathTracer {
   const MotionRates* rates_ = nullptr;
   const MotionRates* splitting_ = nullptr;
   DirectionWarper* warper_ = nullptr;
+  const MovingColours* colours_ = nullptr;
   int light_samples_ = 1;
   bool wide_ = false;
   bool scatters_wide_ = false;

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "integrators/paths/path.h"
+#include "integrators/paths/path_colours.h"
 #include "integrators/paths/path_lights.h"
 #include "integrators/paths/path_rays.h"
 #include "integrators/paths/path_smooth.h"
@@ -14,7 +15,7 @@
 namespace limn {
 
 template <class S, class Visitor>
-inline void PathTracer<S, Visitor>::follow_rays(std::span<const StartRay<S>> rays,
+inline void PathTracer<S, Visitor>::follow_rays(std::span<const StartRay<Place>> rays,
                                                 std::span<Walk> walks) {
   DCHECK_LE(walks.size(), kMostWalks);
   for (size_t i = 0; i < walks.size(); ++i) {
@@ -31,7 +32,7 @@ inline void PathTracer<S, Visitor>::follow_rays(std::span<const StartRay<S>> ray
 }
 
 template <class S, class Visitor>
-inline void PathTracer<S, Visitor>::follow_rays(std::span<const StartRay<S>> rays,
+inline void PathTracer<S, Visitor>::follow_rays(std::span<const StartRay<Place>> rays,
                                                 std::span<const FaceRef> faces,
                                                 std::span<Walk> walks) {
   for (size_t i = 0; i < walks.size(); ++i) {
@@ -42,22 +43,22 @@ inline void PathTracer<S, Visitor>::follow_rays(std::span<const StartRay<S>> ray
 }
 
 template <class S, class Visitor>
-inline Rgb<S> PathTracer<S, Visitor>::escaped(const Vec3<S>& direction, int bounces) const {
+inline Rgb<S> PathTracer<S, Visitor>::escaped(const Vec3<Place>& direction, int bounces) const {
   if (!shows_sky(bounces)) return {};
-  return environment_radiance<S>(*c_.scene.environment, direction);
+  return environment_radiance<S>(*c_.scene.environment, detail::in_scalar<S>(direction));
 }
 
 template <class S, class Visitor>
-inline void PathTracer<S, Visitor>::place(Walk& walk, const SurfacePoint<S>& surface,
-                                          const Vec3<S>& wi) const {
+inline void PathTracer<S, Visitor>::place(Walk& walk, const SurfacePoint<Place>& surface,
+                                          const Vec3<Place>& wi) const {
   walk.surface = surface;
   place(walk, wi);
 }
 
 template <class S, class Visitor>
-inline void PathTracer<S, Visitor>::place(Walk& walk, const Vec3<S>& wi) const {
+inline void PathTracer<S, Visitor>::place(Walk& walk, const Vec3<Place>& wi) const {
   walk.wi = wi;
-  walk.sums.radiance = walk.surface.emission(value(wi), c_.scene.shading);
+  walk.sums.radiance = detail::emission<S>(walk.surface, value(wi), c_.scene.shading);
 }
 
 template <class S, class Visitor>
@@ -110,7 +111,7 @@ inline void PathTracer<S, Visitor>::follow(std::span<Walk* const> walks) {
 }
 
 template <class S, class Visitor>
-inline void PathTracer<S, Visitor>::follow_seen(std::span<const StartRay<S>> rays,
+inline void PathTracer<S, Visitor>::follow_seen(std::span<const StartRay<Place>> rays,
                                                 std::span<Walk> walks) {
   DCHECK_LE(walks.size(), kMostWalks);
   Walk* going[kMostWalks];
@@ -119,11 +120,11 @@ inline void PathTracer<S, Visitor>::follow_seen(std::span<const StartRay<S>> ray
     for (size_t i = 0; i < walks.size(); ++i) {
       Walk& walk = walks[i];
       if (walk.failed) continue;
-      const Vec3<S>&origin = rays[i].origin, &direction = rays[i].direction;
+      const Vec3<Place>&origin = rays[i].origin, &direction = rays[i].direction;
       if (walk.found) {
         if constexpr (!std::is_same_v<Visitor, NoVisitor>) walk.step.from = value(origin);
         renew(walk.surface,
-              [&] { return surface_on_ray<S>(c_.scene, walk.hit.face, origin, direction); });
+              [&] { return surface_on_ray<Place>(c_.scene, walk.hit.face, origin, direction); });
         place(walk, -direction);
         going[count++] = &walk;
       } else if (!wide_) {

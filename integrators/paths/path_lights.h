@@ -91,7 +91,7 @@ inline void PathTracer<S, Visitor>::add_lights(Walk& walk, int count) {
 template <class S, class Visitor>
 inline Rgb<S> PathTracer<S, Visitor>::direct_light(Walk& walk, const Rng& key) {
   draw_light(walk, key);
-  if constexpr (std::is_same_v<S, Dual>) {
+  if constexpr (std::is_same_v<Place, Dual>) {
     if (warper_ && walk.light && !walk.light->light->delta()) {
       return warped_light(walk, key.at(Purpose::kEmitter, walk.bounces));
     }
@@ -135,9 +135,8 @@ inline void PathTracer<S, Visitor>::weigh_light(Walk& walk) const {
     return;
   }
   walk.light_motion = light.face ? nullptr : walk.motion;  // an emitter: held
-  const Vec3<S> direction = detail::moving<S>(light.wo, walk.light_motion);
-  const Evaluation evaluation =
-      detail::evaluate(*walk.scattering, light.wo, direction, walk.light_motion);
+  const Vec3<Place> direction = detail::moving<Place>(light.wo, walk.light_motion);
+  const Evaluation evaluation = evaluate(walk, light.wo, walk.light_motion, direction);
   if (!weigh_light(walk, evaluation)) walk.light.reset();
 }
 
@@ -158,10 +157,10 @@ template <class S, class Visitor>
 template <class S, class Visitor>
 inline void PathTracer<S, Visitor>::draw_delta(Walk& walk, const DeltaLight& delta) const {
   const bool passes = walk.two_sided && walk.beyond;
-  const Vec3<S> p = passes ? beyond(c_.scene, walk.surface, walk.wi).p : walk.surface.p;
-  const auto arriving = limn::arrival<S>(delta, p);
+  const Vec3<Place> p = passes ? beyond(c_.scene, walk.surface, walk.wi).p : walk.surface.p;
+  const auto arriving = limn::arrival<S>(delta, detail::in_scalar<S>(p));
   if (arriving) {
-    const Rgb<S> f = walk.scattering->eval(arriving->wo);
+    const Rgb<S> f = scattered_into(walk, arriving->wo);
     walk.light_share = f * arriving->irradiance * (1 / walk.light->pdf);
     if constexpr (!std::is_same_v<S, double>) {
       if (std::fabs(dot(walk.surface.n_g, value(arriving->wo))) <= kEdgeOn) {
@@ -178,7 +177,7 @@ template <class S, class Visitor>
 inline Rgb<S> PathTracer<S, Visitor>::light_value(const Walk& walk) const {
   const LightSample& light = *walk.light;
   if (light.light->delta()) return walk.light_share;
-  if constexpr (std::is_same_v<S, Dual>) {
+  if constexpr (std::is_same_v<Place, Dual>) {
     if (const DirectionMotion* motion = walk.light_motion) {
       return walk.light_share * light.light->radiance(detail::moving<S>(light.wo, motion)) *
              walk.light_weight;
@@ -194,11 +193,12 @@ template <class S, class Visitor>
   const LightSample& light = *walk.light;
   if (light.face && c_.scene.shape(light.face->shape).radiance_texture) {
     const bool passes = walk.two_sided && walk.beyond;
-    const Vec3<S> p = passes ? beyond(c_.scene, walk.surface, walk.wi).p : walk.surface.p;
-    return surface_on_ray<S>(c_.scene, *light.face, p, detail::moving<S>(light.wo, motion))
-        .emission(-light.wo, c_.scene.shading);
+    const Vec3<Place> p = passes ? beyond(c_.scene, walk.surface, walk.wi).p : walk.surface.p;
+    const auto at =
+        surface_on_ray<Place>(c_.scene, *light.face, p, detail::moving<Place>(light.wo, motion));
+    return detail::emission<S>(at, -light.wo, c_.scene.shading);
   }
-  return light.light->template drawn_radiance<S>(light);
+  return drawn_radiance(light);
 }
 
 // What a light adds where directions are warped: auxiliary rays are traced for light that
@@ -206,12 +206,12 @@ template <class S, class Visitor>
 template <class S, class Visitor>
 inline Rgb<S> PathTracer<S, Visitor>::warped_light(const Walk& walk, const Rng& key) {
   const LightSample& light = *walk.light;
-  const SurfacePoint<S>& surface = walk.surface;
-  const Scattering<S>& scattering = *walk.scattering;
+  const SurfacePoint<Place>& surface = walk.surface;
+  const Scattering<Place>& scattering = *walk.scattering;
   if (detail::stays_black(scattering.eval(light.wo))) return {};
   if (shadowed(walk)) return {};
   const DirectionMotion* motion = warper_->motion(surface, light.wo, key.at(Purpose::kEmitter, 1));
-  const Vec3<S> direction = detail::moving<S>(light.wo, motion);
+  const Vec3<Place> direction = detail::moving<Place>(light.wo, motion);
   const auto [f, bsdf_pdf] = detail::evaluate(scattering, light.wo, direction, motion);
   const double weight = mis_weight_over_pdf(light.pdf, density(walk, light.wo, bsdf_pdf));
   const Rgb<S> radiance =

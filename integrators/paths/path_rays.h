@@ -43,14 +43,14 @@ inline std::optional<FaceSide> PathTracer<S, Visitor>::blocked_at_start(
 
 // Onto the face that a ray along `direction` meets at once.
 template <class S, class Visitor>
-inline void PathTracer<S, Visitor>::move_along_edge(SurfacePoint<S>& surface, FaceRef face,
+inline void PathTracer<S, Visitor>::move_along_edge(SurfacePoint<Place>& surface, FaceRef face,
                                                     const Vec3d& direction) const {
   // Only primal paths start on edges, so the point itself does not change.
-  const Vec3<S> p = surface.p;
+  const Vec3<Place> p = surface.p;
   const auto corners = face_corners<double>(c_.scene.shape(face.shape).mesh, face.face);
   Vec3d n = cross(corners[1] - corners[0], corners[2] - corners[0]);
   if (dot(n, direction) < 0) n = -n;
-  surface = surface_on_ray<S>(c_.scene, face, p, Vec3<S>{n.x, n.y, n.z});
+  surface = surface_on_ray<Place>(c_.scene, face, p, Vec3<Place>{n.x, n.y, n.z});
 }
 
 // Brings what says where a face lies into the cache.
@@ -69,11 +69,11 @@ inline void PathTracer<S, Visitor>::fetch_corners(const Walk& walk) const {
   const Mesh& mesh = c_.scene.shape(face.shape).mesh;
   for (const uint32_t vertex : mesh.face(face.face)) {
     __builtin_prefetch(&mesh.positions[vertex]);
-    if constexpr (!std::is_same_v<S, double>) {
+    if constexpr (!kPlain) {
       if (!mesh.position_tangents.empty()) __builtin_prefetch(&mesh.position_tangents[vertex]);
     }
   }
-  if (mesh.normal_source != NormalSource::kFace) detail::fetch_shading<S>(mesh, face.face);
+  if (mesh.normal_source != NormalSource::kFace) detail::fetch_shading<Place>(mesh, face.face);
 }
 
 // Where rays along walk.wo leave the scene, which has an environment; brings that into the cache.

@@ -56,14 +56,14 @@ inline bool PathTracer<S, Visitor>::hides_edges(Walk& walk, const Vec3d& wo) con
 // vertex, and what holds directions of rough lobes does not hold this one.
 template <class S, class Visitor>
 inline bool PathTracer<S, Visitor>::turn_smoothly(Walk& walk) const {
-  const SmoothRay<S> ray = walk.scattering->smooth_ray(walk.smooth_ray);
+  const SmoothRay<S> ray = smooth_ray(walk);
   if (!(walk.smooth_share > 0) || detail::stays_black(ray.weight)) return false;
   if (!walk.turned_by.valid() && hides_edges(walk, value(ray.wo))) {
     walk.turned_by = walk.surface.face.shape;
     walk.before_turn = value(walk.sums.radiance);
   }
   walk.motion = nullptr;
-  walk.direction = ray.wo;
+  walk.direction = detail::in_scalar<Place>(ray.wo);
   walk.wo = value(ray.wo);
   walk.pdf = std::numeric_limits<double>::infinity();
   walk.throughput = walk.throughput * ray.weight * (1 / walk.smooth_share);

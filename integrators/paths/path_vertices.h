@@ -18,6 +18,10 @@ inline bool PathTracer<S, Visitor>::begin_vertex(Walk& walk) {
   if (c_.unmoved && walk.scattering->is_smooth()) {
     walk.scattering->share_by(SmoothShares::By::kSteps);
   }
+  if constexpr (kColoursAlone<S, Visitor>) {
+    if (walk.scattering->is_smooth()) walk.scattering->share_by(SmoothShares::By::kSlope);
+    colour(walk);
+  }
   set_motion(walk);
   walk.light.reset();
   walk.lit = walk.again;
@@ -31,8 +35,10 @@ inline bool PathTracer<S, Visitor>::begin_vertex(Walk& walk) {
                     walk.bounces, walk.key);
   }
   if (c_.closed) {
-    walk.sums.radiance +=
-        c_.closed->scattered(c_.tracer, walk.surface, *walk.scattering, walk.start_edge());
+    if constexpr (!kColoursAlone<S, Visitor>) {
+      walk.sums.radiance +=
+          c_.closed->scattered(c_.tracer, walk.surface, *walk.scattering, walk.start_edge());
+    }
     return false;
   }
   if (!walk.scattering->is_rough()) {
@@ -107,7 +113,7 @@ inline bool PathTracer<S, Visitor>::choose_direction(Walk& walk) {
     walk.wo = walk.scattering->sample(walk.u[0], walk.u[1]).value_or(Vec3d{});
   }
   if (walk.wo == Vec3d{}) return false;
-  if constexpr (std::is_same_v<S, Dual>) {
+  if constexpr (std::is_same_v<Place, Dual>) {
     if (warper_) {
       const Rng key = walk.key.at(Purpose::kBsdf, walk.bounces).at(Purpose::kBsdf, 1);
       walk.motion = warper_->motion(walk.surface, walk.wo, key);
@@ -118,8 +124,8 @@ inline bool PathTracer<S, Visitor>::choose_direction(Walk& walk) {
 
 template <class S, class Visitor>
 inline bool PathTracer<S, Visitor>::scatter(Walk& walk) {
-  walk.direction = detail::moving<S>(walk.wo, walk.motion);
-  return scatter(walk, detail::evaluate(*walk.scattering, walk.wo, walk.direction, walk.motion));
+  walk.direction = detail::moving<Place>(walk.wo, walk.motion);
+  return scatter(walk, evaluate(walk, walk.wo, walk.motion, walk.direction));
 }
 
 // evaluation: at walk.direction, which is walk.wo as it moves.
@@ -130,7 +136,7 @@ template <class S, class Visitor>
   if (detail::stays_black(f)) return false;
   const double pdf = density(walk, walk.wo, scattered);
   walk.pdf = pdf;
-  detail::add_score<S>(walk, value(walk.throughput) * (1 / pdf));
+  detail::add_score<Place>(walk, value(walk.throughput) * (1 / pdf));
   walk.before = walk.throughput;
   walk.throughput = walk.throughput * detail::stretched(f, walk.wo, walk.motion) * (1 / pdf);
   if (c_.unmoved) walk.albedo *= unmoved_albedo(walk);
@@ -152,17 +158,17 @@ inline void PathTracer<S, Visitor>::escape(std::span<Walk* const> walks) const {
 
 template <class S, class Visitor>
 inline void PathTracer<S, Visitor>::escape(Walk& walk) const {
+  const auto sky = [&] {
+    return environment_radiance<S>(*c_.scene.environment, detail::in_scalar<S>(walk.direction));
+  };
   if (std::isinf(walk.pdf)) {
-    walk.sums.radiance +=
-        walk.throughput * environment_radiance<S>(*c_.scene.environment, walk.direction);
+    walk.sums.radiance += walk.throughput * sky();
     return;
   }
-  auto sight = c_.lights.template environment<S>(walk.lights, walk.wo, walk.sky);
-  if (walk.motion) {
-    sight.radiance = environment_radiance<S>(*c_.scene.environment, walk.direction);
-  }
-  const double other = light_pdf(walk, sight.pdf);
-  walk.sums.radiance += walk.throughput * sight.radiance * mis_weight(walk.pdf, other);
+  Environment::Sight<S> seen = sight(walk);
+  if (walk.motion) seen.radiance = sky();
+  const double other = light_pdf(walk, seen.pdf);
+  walk.sums.radiance += walk.throughput * seen.radiance * mis_weight(walk.pdf, other);
 }
 
 // Goes on to what the ray meets.
@@ -175,8 +181,9 @@ inline bool PathTracer<S, Visitor>::arrive(Walk& walk) {
     return false;
   }
   if (walk.hit.t > 0) {
-    const Vec3<S> from = walk.surface.p;
-    renew(walk.surface, [&] { return surface_on_ray<S>(c_.scene, face, from, walk.direction); });
+    const Vec3<Place> from = walk.surface.p;
+    renew(walk.surface,
+          [&] { return surface_on_ray<Place>(c_.scene, face, from, walk.direction); });
     walk.edge = nullptr;
     walk.beside_edge = false;
   } else {
@@ -196,7 +203,7 @@ inline bool PathTracer<S, Visitor>::arrive(Walk& walk) {
 template <class S, class Visitor>
 inline void PathTracer<S, Visitor>::set_motion(Walk& walk) const {
   walk.motion = nullptr;
-  if constexpr (std::is_same_v<S, Dual>) {
+  if constexpr (std::is_same_v<Place, Dual>) {
     if (walk.bounces > 0 || !walk.field) return;
     walk.field_motion = rates_->motion_at(value(walk.surface.p), *walk.field);
     walk.motion = &walk.field_motion;
@@ -206,8 +213,8 @@ inline void PathTracer<S, Visitor>::set_motion(Walk& walk) const {
 // Where a vertex slides fast, what further directions bring is as large: more of them in place of
 // one. Paths of one beginning are so many at most, however deep they go.
 template <class S, class Visitor>
-inline int PathTracer<S, Visitor>::splits(const SurfacePoint<S>& surface, int copies) const {
-  if constexpr (std::is_same_v<S, Dual>) {
+inline int PathTracer<S, Visitor>::splits(const SurfacePoint<Place>& surface, int copies) const {
+  if constexpr (std::is_same_v<Place, Dual>) {
     if (!splitting_) return 1;
     const int most = kMostSplits / copies;
     const double slides = splitting_->sliding({surface.p.x.d, surface.p.y.d, surface.p.z.d});
@@ -219,9 +226,9 @@ inline int PathTracer<S, Visitor>::splits(const SurfacePoint<S>& surface, int co
 
 template <class S, class Visitor>
 inline Rgb<S> PathTracer<S, Visitor>::emitted(const Walk& walk) const {
-  const SurfacePoint<S>& surface = walk.surface;
+  const SurfacePoint<Place>& surface = walk.surface;
   const double distance = walk.hit.t;
-  const Rgb<S> radiance = surface.emission(-walk.wo, c_.scene.shading);
+  const Rgb<S> radiance = detail::emission<S>(surface, -walk.wo, c_.scene.shading);
   if (detail::stays_black(radiance)) return radiance;
   // A face around an edge that is met at distance 0 is never drawn by light sampling.
   if (std::isinf(walk.pdf)) return radiance;

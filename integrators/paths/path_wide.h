@@ -30,20 +30,20 @@ inline void PathTracer<S, Visitor>::evaluate_wide(std::span<Walk*> walks,
   size_t count = 0;
   for (Walk* const walk : walks) {
     walks[count] = walk;
-    const Scattering<S>& scattering = *walk->scattering;
+    const Scattering<Place>& scattering = *walk->scattering;
     count += scattering.bsdf().lobes().below || dot(scattering.normal(), *direction(*walk)) > 0;
   }
   Grouped<Bsdf, Bsdf::Evaluation, kMostWalks> asked;
   BsdfValue values[kMostWalks];
   for (size_t i = 0; i < count; ++i) {
-    const Scattering<S>& scattering = *walks[i]->scattering;
+    const Scattering<Place>& scattering = *walks[i]->scattering;
     asked.add(scattering.bsdf(), {&scattering.normal(), &scattering.wi(), direction(*walks[i]),
                                   &values[i], scattering.at()});
   }
   asked.for_each([](const Bsdf& bsdf, auto items) { bsdf.eval_with_pdf_each(items); });
   for (size_t i = 0; i < count; ++i) {
     Walk& walk = *walks[i];
-    then(walk, walk.scattering->held(values[i]));
+    then(walk, coloured(walk, walk.scattering->held(values[i]), *direction(walk)));
   }
 }
 
@@ -77,7 +77,7 @@ inline size_t PathTracer<S, Visitor>::scatter_wide(std::span<Walk*> walks) {
   Grouped<Bsdf, Bsdf::Draw, kMostWalks> draws;
   for (Walk* const walk : walks) {
     if (draw_mirrored(*walk)) continue;
-    const Scattering<S>& scattering = *walk->scattering;
+    const Scattering<Place>& scattering = *walk->scattering;
     draws.add(scattering.bsdf(),
               {&scattering.normal(), &scattering.wi(), walk->u.data(), &walk->wo, scattering.at()});
   }
@@ -100,7 +100,7 @@ inline size_t PathTracer<S, Visitor>::scatter_wide(std::span<Walk*> walks) {
 // What the camera's rays see that meet nothing; `rest`, while that is fetched.
 template <class S, class Visitor>
 template <class Rest>
-inline void PathTracer<S, Visitor>::see_sky_wide(std::span<const StartRay<S>> rays,
+inline void PathTracer<S, Visitor>::see_sky_wide(std::span<const StartRay<Place>> rays,
                                                  std::span<Walk> walks, const Rest& rest) const {
   Walk* leaving[kMostWalks];
   size_t count = 0;
@@ -114,7 +114,14 @@ inline void PathTracer<S, Visitor>::see_sky_wide(std::span<const StartRay<S>> ra
   rest();
   for (size_t i = 0; i < count; ++i) {
     Walk& walk = *leaving[i];
-    walk.sums.radiance = c_.scene.environment->radiance_at(walk.wo, walk.sky);
+    if constexpr (kColoursAlone<S, Visitor>) {
+      if (colours_->of_sky()) {
+        walk.sums.radiance = escaped(walk.wo, walk.bounces);
+        continue;
+      }
+    }
+    const Rgb<double> held = c_.scene.environment->radiance_at(walk.wo, walk.sky);
+    walk.sums.radiance = detail::in_scalar<S>(held);
   }
 }
 

@@ -1,9 +1,18 @@
 // What paths need of a scene, in the order in which one part needs the other.
 #include "integrators/paths/traced_scene.h"
 
+#include <algorithm>
+
 #include "integrators/paths/straight_way.h"
 
 namespace limn {
+
+bool is_glossy(const Scene& scene) {
+  return std::ranges::any_of(scene.shapes, [](const Shape& shape) {
+    const auto is_ggx = [](const Bsdf* side) { return side && side->lobe().model == &ggx_lobe(); };
+    return is_ggx(shape.bsdf->side(true)) || is_ggx(shape.bsdf->side(false));
+  });
+}
 
 TracedScene::TracedScene(const Scene& scene, int threads, const Options& options)
     : tracer_([&] {

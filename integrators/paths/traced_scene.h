@@ -8,6 +8,9 @@
 
 namespace limn {
 
+// Whether any material is worth lanes (PathTracer::work_wide).
+bool is_glossy(const Scene& scene);
+
 // Which light and which share of the directions paths draw, and how they end, as a scene has it
 // before it moves. The scene must outlive it.
 struct PathChoices {

@@ -35,9 +35,22 @@ struct PathSums {
   uint64_t later_lights = 0;  // light samples behind it
 };
 
+// The visitor of paths whose vertices no parameter moves. Their places and directions, and all that
+// is drawn, are plain numbers: only colours carry derivatives, by what changes them.
+struct Unmoved {
+  template <class... A>
+  void operator()(const A&...) const {}
+};
+// The scalar of places and directions, and whether it is another than that of colours, S.
+template <class S, class Visitor>
+using PlaceScalar = std::conditional_t<std::is_same_v<Visitor, Unmoved>, double, S>;
+template <class S, class Visitor>
+inline constexpr bool kColoursAlone = !std::is_same_v<PlaceScalar<S, Visitor>, S>;
+
 // A path under way: a vertex, how it was reached, and what is asked for next.
 template <class S, class Visitor>
 struct Walk {
+  using Place = PlaceScalar<S, Visitor>;
   // scattered: how often the whole path has scattered before. visitor: see PathTracer; may be null.
   Walk(const Rng& path_key, int scattered, Visitor* at_vertices)
       : key(path_key), visitor(at_vertices), bounces(scattered) {}
@@ -52,8 +65,8 @@ struct Walk {
   bool failed = false;        // it asked for a ray that cannot be traced
   EdgeStart* edge = nullptr;  // where the surface lies, if the path starts on an edge and is there
   bool beside_edge = false;   // the path starts on an edge, or just beside it as seen, and is there
-  SurfacePoint<S> surface;
-  Vec3<S> wi;
+  SurfacePoint<Place> surface;
+  Vec3<Place> wi;
   Rgb<S> throughput = grey(S(1.0));
   double albedo = 1;         // bounds it, by the materials of PathContext::unmoved
   double eta = 1;            // the index of refraction here over that where it started
@@ -64,10 +77,12 @@ struct Walk {
   PathStep step;
   PathSums<S> sums;
 
-  std::optional<Scattering<S>> scattering;
-  const DirectionMotion* motion = nullptr;  // null where directions are held
   struct Nothing {};
-  std::conditional_t<std::is_same_v<S, Dual>, DirectionMotion, Nothing> field_motion;
+  std::optional<Scattering<Place>> scattering;
+  // The same with its derivatives, where it has any and places have none.
+  std::conditional_t<kColoursAlone<S, Visitor>, std::optional<Scattering<S>>, Nothing> coloured;
+  const DirectionMotion* motion = nullptr;  // null where directions are held
+  std::conditional_t<std::is_same_v<Place, Dual>, DirectionMotion, Nothing> field_motion;
 
   Lights::Point lights;  // the vertex, for them
   // The vertex passes light roughly and is lifted: lights are drawn for one of its sides, with
@@ -83,7 +98,7 @@ struct Walk {
   std::array<double, 3> u{};       // from which its direction is drawn
   MirroredLight::Mixture mixture;  // that its direction is drawn from
   Vec3d wo;
-  Vec3<S> direction;        // the same as it moves
+  Vec3<Place> direction;    // the same as it moves
   double pdf = 0;           // [1/sr]; infinite of a smooth ray
   int smooth_ray = 0;       // which one, if it is
   double smooth_share = 0;  // the probability of that

@@ -87,7 +87,9 @@ TermEstimator::TermEstimator(const Scene& scene, std::span<const Parameter> para
     paths_ = paths_ || terms_[slot]->uses_paths();
     vertices_ = vertices_ || terms_[slot]->uses_vertices();
   }
-  if (warping && moved_in(scene, parameters).any()) {
+  const bool moved = moved_in(scene, parameters).any();
+  if (!moved && !closed) values_ = std::make_unique<ValuePaths>(traced_.context(), parameters);
+  if (warping && moved) {
     warp_field_ = std::make_unique<WarpField>(scene_, traced_.context().tracer, input_.edges(),
                                               warping->options, warping->unbiased);
   }
@@ -262,7 +264,8 @@ class TermEstimator::Convoy {
     add_cost(costs, walks_.size(), sink_.cost(estimator_.pixel_slot_));
     for (size_t i = 0; i < walks_.size(); ++i) {
       const PixelSample& at = places_[i].at;
-      estimator_.add_path(at, estimator_.path_of(walks_[i]), weights_[i], sink_);
+      estimator_.add_path(at, estimator_.path_of(walks_[i].sums, walks_[i].failed), weights_[i],
+                          sink_);
       if (walks_[i].visitor) estimator_.add_vertices(at, *walks_[i].visitor, sink_);
     }
     walks_.clear();
@@ -287,6 +290,7 @@ void TermEstimator::add_pixels(std::span<const KeyedSample> samples, SampleSink&
     for (const auto& [at, key] : samples) add_logged(at, key, sink);
     return;
   }
+  if (values_) return add_values(samples, sink);
   Convoy convoy(*this, sink);
   for (const auto& [at, key] : samples) {
     const PixelCounts counts = plan_.counts_at(at);
@@ -415,13 +419,12 @@ TermEstimator::PathCosts TermEstimator::trace(std::span<const PathStart> places,
   return costs;
 }
 
-template <class Visitor>
-TermEstimator::Path TermEstimator::path_of(const Walk<Dual, Visitor>& walk) const {
-  Path path{walk.sums, !walk.failed};
-  path.finite = path.finite && is_finite(value(walk.sums.radiance)) && is_finite(walk.sums.score);
+TermEstimator::Path TermEstimator::path_of(const PathSums<Dual>& found, bool failed) const {
+  Path path{found, !failed};
+  path.finite = path.finite && is_finite(value(found.radiance)) && is_finite(found.score);
   for (const auto& term : terms_) {
     if (term && term->uses_paths()) {
-      path.finite = path.finite && is_finite(term->add_path(walk.sums.radiance));
+      path.finite = path.finite && is_finite(term->add_path(found.radiance));
     }
   }
   return path;
@@ -435,7 +438,7 @@ TermEstimator::Path TermEstimator::trace_one(const PathStart& place, const Rng& 
   walk.field = field;
   const PathCosts costs = trace<Visitor>({&place, 1}, {&walk, 1}, log, twice);
   add_cost(costs, 1, cost);
-  return path_of(walk);
+  return path_of(walk.sums, walk.failed);
 }
 
 void TermEstimator::add_cost(const PathCosts& costs, size_t paths, TermCost& cost) {

@@ -11,6 +11,7 @@
 #include "integrators/paths/warp_field.h"
 #include "integrators/pilot/pilot_moments.h"
 #include "integrators/pilot/sample_plan.h"
+#include "integrators/pilot/value_paths.h"
 #include "integrators/terms/lane_sinks.h"
 #include "integrators/terms/term.h"
 #include "limn/core/parameter.h"
@@ -114,8 +115,8 @@ class TermEstimator final : public SampleEstimator {
   template <class Visitor>
   Path trace_one(const PathStart& place, const Rng& key, const DirectionField* field,
                  Visitor& visitor, SampleLog* log, TermCost& cost, bool twice = false) const;
-  template <class Visitor>
-  Path path_of(const Walk<Dual, Visitor>& walk) const;
+  Path path_of(const PathSums<Dual>& found, bool failed) const;
+  void add_values(std::span<const KeyedSample> samples, SampleSink& sink) const;
   void add_moved_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const;
   Rgb<Lanes> sample_moved_pixel(size_t slot, const PixelSample& at, const Rng& key,
                                 SampleSink& sink) const;
@@ -149,6 +150,7 @@ class TermEstimator final : public SampleEstimator {
   bool paths_ = false, vertices_ = false;     // whether some term uses them
   bool moves_film_;                           // whether a plan may
   MotionRates rates_;
+  std::unique_ptr<ValuePaths> values_;     // null where something moves
   std::unique_ptr<WarpField> warp_field_;  // null where directions are not warped
   // What a pilot turns directions by: about the axes x, y and z in the lanes 1 to 3.
   DirectionField turning_;

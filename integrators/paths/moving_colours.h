@@ -1,0 +1,25 @@
+#pragma once
+// What scatters or sends light with derivatives.
+#include <array>
+#include <span>
+#include <vector>
+
+#include "limn/core/parameter.h"
+#include "limn/core/scene.h"
+
+namespace limn {
+
+class MovingColours {
+ public:
+  // scene: with these parameters seeded.
+  MovingColours(const Scene& scene, std::span<const Parameter> parameters);
+  // Whether a side of a shape scatters with any.
+  bool of(ShapeId shape, bool front) const { return sides_[shape.index()][front]; }
+  bool of_sky() const { return sky_; }
+
+ private:
+  std::vector<std::array<bool, 2>> sides_;
+  bool sky_ = false;
+};
+
+}  // namespace limn

@@ -1,0 +1,64 @@
+// Paths whose colours alone carry derivatives, and how an estimator adds them up.
+#include "integrators/pilot/value_paths.h"
+
+#include <array>
+#include <vector>
+
+#include "integrators/paths/film_rays.h"
+#include "integrators/paths/path_follow.h"
+#include "integrators/paths/traced_scene.h"
+#include "integrators/pilot/term_estimator.h"
+
+namespace limn {
+
+ValuePaths::ValuePaths(const PathContext& context, std::span<const Parameter> parameters)
+    : context_(context),
+      colours_(context.scene, parameters),
+      camera_(context.scene.camera),
+      filter_(context.scene.film.filter),
+      glossy_(is_glossy(context.scene)) {}
+
+void ValuePaths::trace(std::span<const KeyedSample> samples, int light_samples, RayCount& rays,
+                       std::span<Found> found) const {
+  PathTracer<Dual, Unmoved> tracer(context_, rays);
+  tracer.colour_by(colours_);
+  tracer.work_wide(glossy_);
+  tracer.take_light_samples(light_samples);
+  const FilmRays starts(context_.scene, camera_, filter_, samples, false);
+  std::vector<Walk<Dual, Unmoved>> walks;
+  walks.reserve(samples.size());
+  for (const KeyedSample& sample : samples) walks.emplace_back(sample.key, 0, nullptr);
+  tracer.follow_rays(starts.starts(), walks);
+  for (size_t i = 0; i < samples.size(); ++i) {
+    found[i] = {walks[i].sums.radiance, walks[i].failed};
+  }
+}
+
+void TermEstimator::add_values(std::span<const KeyedSample> samples, SampleSink& sink) const {
+  std::vector<KeyedSample> paths;
+  std::vector<double> weights;
+  const auto finish = [&] {
+    std::array<ValuePaths::Found, kMostTogether> found;
+    PathCosts costs;
+    values_->trace(paths, plan_.light_samples, costs.rays, found);
+    add_cost(costs, paths.size(), sink.cost(pixel_slot_));
+    for (size_t i = 0; i < paths.size(); ++i) {
+      PathSums<Dual> sums;
+      sums.radiance = found[i].radiance;
+      add_path(paths[i].at, path_of(sums, found[i].failed), weights[i], sink);
+    }
+    paths.clear();
+    weights.clear();
+  };
+  for (const auto& [at, key] : samples) {
+    const int count = static_cast<int>(plan_.counts_at(at)[pixel_slot_]);
+    for (int i = 0; i < count; ++i) {
+      if (paths.size() == kMostTogether) finish();
+      paths.push_back({at, key.path(i)});
+      weights.push_back(1.0 / count);
+    }
+  }
+  finish();
+}
+
+}  // namespace limn
