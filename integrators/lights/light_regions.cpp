@@ -2,6 +2,7 @@
 #include "integrators/lights/light_regions.h"
 
 #include <algorithm>
+#include <numeric>
 
 #include "limn/core/bounds.h"
 #include "limn/core/light.h"
@@ -287,12 +288,16 @@ void LightRegions::choose(const Vec3d& p, double u, std::vector<Choice>& choices
 }
 
 void LightRegions::leave_out_dim_emitters() {
+  // Of all light. Lists before 16 of 10,000 alike took a quarter of a short run.
+  constexpr double kDim = 1.0 / 256;
   if (regions_.size() <= kMost) return;
   const auto light = [](const Region& region) { return region.luminance * region.hull.area; };
   std::vector<double> lights;
   for (const Region& region : regions_) lights.push_back(light(region));
+  const double all = std::accumulate(lights.begin(), lights.end(), 0.0);
   std::nth_element(lights.begin(), lights.begin() + kMost, lights.end(), std::greater<>());
-  for (Region& region : regions_) region.lists_edges = light(region) > lights[kMost];
+  const double least = std::max(lights[kMost], kDim * all);
+  for (Region& region : regions_) region.lists_edges = light(region) > least;
 }
 
 bool LightRegions::any_in(const Scene& scene) {
