@@ -9,6 +9,7 @@
 #include <cmath>
 #include <tuple>
 
+#include "integrators/terms/lane_sinks.h"
 #include "limn/core/surface_point.h"
 #include "limn/integrators/render.h"
 #include "support/check_runs.h"
@@ -154,6 +155,57 @@ TEST(LiftedPoints, MeetAtEdges) {
     }
   }
   EXPECT_GT(edges, 50);
+}
+
+// The rate of a point that a camera at rest sees, and of what it is lifted to, is that of
+// surface_on_ray, which carries derivatives itself.
+TEST(LiftedPoints, SeenPointsMoveAsSurfacesSay) {
+  const TempFiles files;
+  SceneParts parts;
+  parts.origin = {0.3, 0.2, 5};
+  parts.target = {0, 0, 0};
+  parts.body = obj_shape("waves", write_mesh(files, "waves.obj", waves_mesh()), false, 1, {},
+                         diffuse("clay", "0.6, 0.6, 0.6"));
+  Scene scene = make_scene(files, parts);
+  Mesh& mesh = scene.shapes[0].mesh;
+  set_test_tangents(mesh);
+  update_shading_normals(mesh);
+  const Vec3d g = normalize(Vec3d{0.3, -0.5, 0.8});
+  Rng rng(31, 0, 0);
+  int seen = 0;
+  double largest = 0;  // of what a lift adds
+  for (uint32_t i = 0; i < 300 * mesh.faces.size(); ++i) {
+    const FaceRef face{ShapeId(0), FaceId(i % static_cast<uint32_t>(mesh.faces.size()))};
+    FilmPlace at;
+    at.x = scene.camera.width * rng.uniform();
+    at.y = scene.camera.height * rng.uniform();
+    const auto ray = ray_at(CameraView<Dual>(scene.camera), at);
+    const auto point = surface_on_ray<Dual>(scene, face, ray.origin, ray.direction);
+    const Vec3d origin = value(ray.origin), omega = value(ray.direction);
+    const auto corners = face_corners<double>(mesh, face.face);
+    const Vec3d n = cross(corners[1] - corners[0], corners[2] - corners[0]);
+    BoundaryForm form;
+    form.distance = dot(n, corners[0] - origin) / dot(n, omega);
+    form.x = origin + omega * form.distance;
+    const auto b = barycentric(corners, form.x);
+    if (*std::min_element(b.begin(), b.end()) < 0) continue;  // beside the face
+    form.add_seen_point(scene, face, omega, g);
+    FilmSample sample{};
+    FilmLanes sink(scene, false, sample);
+    sink.at(at);
+    ASSERT_TRUE(sink.takes(form, rng));
+    sink.add(grey(1.0));
+    const Lanes expected = point.p.x.d * g.x + point.p.y.d * g.y + point.p.z.d * g.z;
+    for (int k = 0; k < kLanes; ++k) EXPECT_NEAR(sample.value.g[k], expected[k], 1e-12) << i;
+    form.lift.reset();
+    sink.takes(form, rng);
+    sink.add(grey(1.0));
+    for (int k = 0; k < kLanes; ++k)
+      largest = std::max(largest, std::fabs(sample.value.g[k] - expected[k]));
+    ++seen;
+  }
+  EXPECT_GT(seen, 20);
+  EXPECT_GT(largest, 0.01);
 }
 
 // Flat strips with narrow grooves: normals are upright at two corners of a face and lean at the

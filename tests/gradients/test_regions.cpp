@@ -4,10 +4,13 @@
 #include <gtest/gtest.h>
 
 #include "integrators/lights/light_regions.h"
+#include "integrators/terms/penumbra_lines.h"
+#include "integrators/terms/term.h"
 #include "limn/core/image.h"
 #include "support/block_runs.h"
 #include "support/check_runs.h"
 #include "support/meshes.h"
+#include "support/running_mean.h"
 #include "support/scenes.h"
 
 namespace limn {
@@ -325,6 +328,40 @@ TEST(Regions, NoneWithoutLamps) {
   EXPECT_EQ(a.terms.size(), b.terms.size());
   for (size_t i = 0; i < a.parameters[0].total.size(); ++i)
     ASSERT_EQ(a.parameters[0].total.mean(i), b.parameters[0].total.mean(i));
+}
+
+// Lines of a small share go on by roulette: on average each counts by its share over its density.
+TEST(Regions, SmallSharesStayWholeOnAverage) {
+  const TempFiles files;
+  Scene scene = lit_scene(files, lights_of(files, "above"));
+  find_parameter(scene, "body.translate.x").seed(scene, 0);
+  const auto tracer = make_embree_tracer(scene, 1);
+  const Lights lights(scene);
+  const PathContext context{scene, *tracer, lights};
+  TermInput input(context, 1, {1, 1, 1, 1}, edge_sampler_type("silhouettes"), 1);
+  const EmitterEdges* edges = input.emitter_edges();
+  ASSERT_TRUE(edges);
+  const PenumbraLines lines(context, input.edges(), *input.regions(), *edges);
+  const PathStep step{value(scene.camera.origin), 0};
+  Rng rng(41, 0, 0);
+  RayCount rays;
+  RunningMean ratios;  // of what a line counts to what it should
+  int count = 0;
+  for (int i = 0; i < 20000; ++i) {
+    const auto drawn = lines.draw(rng.uniform(), rng, rays);
+    if (!drawn) continue;
+    const auto [density, share] =
+        penumbra_share(scene, input.edges(), *input.regions(), *edges, drawn->line, step, 0);
+    if (!(share > 0.005 && share < 0.1)) continue;
+    DrawnLine line = *drawn;
+    const bool goes_on = lines.complete(line, step, 0, rng);
+    const double counts = goes_on ? drawn->edge.probability / line.edge.probability : 0;
+    ratios.add(counts / (share / density));
+    ++count;
+  }
+  fmt::print("{} lines, {:.3g} times their share\n", count, ratios.mean());
+  EXPECT_GT(count, 200);
+  EXPECT_LT(std::fabs(ratios.z_score(1)), 4);
 }
 
 }  // namespace

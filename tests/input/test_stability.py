@@ -58,7 +58,7 @@ class TestStatedErrors(unittest.TestCase):
         self.assertLess(calibration.ratios(self.runs(1))["beyond"], 0.008)
         self.assertGreater(calibration.ratios(self.runs(0.5))["beyond"], 0.1)
 
-    def test_table_is_put_into_a_page_and_replaced(self):
+    def test_figures_are_put_into_a_page_and_replaced(self):
         rows = [{"scene": "sun", "method": "fd", "spp": spp, "sum": 0.5, "pixel": 2, "beyond": 0.25}
                 for spp in calibration.LEVELS]
         with tempfile.TemporaryDirectory(prefix="limn_stability_") as folder:
@@ -70,7 +70,7 @@ class TestStatedErrors(unittest.TestCase):
             with open(page, encoding="utf-8") as stream:
                 text = stream.read()
         self.assertTrue(text.startswith("# Page\n"))
-        self.assertEqual(text.count("| `fd` | " + "0.50, 2.00 | " * len(calibration.LEVELS)), 1)
+        self.assertEqual(text.count("`fd` 0.50–0.50 (sums), 2.00–2.00 (pixels)"), 1)
 
     def test_every_method_and_scene_is_known(self):
         self.assertEqual(set(calibration.gradient_methods(LIMN)) & {"adaptive", "was", "fd"},

@@ -119,7 +119,8 @@ EdgeSamplerInput many_objects() {
     Vec3d rows[3];
     random_rotation(rng, rows);
     const Vec3d at = o == 0 ? Vec3d{0, 0, -2} : random_direction(rng) * (2 * rng.uniform());
-    Mesh mesh = transformed(o % 2 == 0 ? grid_mesh(1) : cube_mesh(), rows, o == 0 ? 2 : 0.05, at);
+    Mesh mesh =
+        transformed(o % 2 == 0 ? tetrahedron_mesh() : cube_mesh(), rows, o == 0 ? 2 : 0.05, at);
     if (o % 5 == 4) set_test_tangents(mesh);
     input.objects.push_back(build_edge_mesh(mesh, o % 3 != 0, ShapeId(o)));
   }

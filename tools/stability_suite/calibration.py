@@ -128,32 +128,42 @@ def _number(value):
     return "–" if value is None else f"{value:.2f}"
 
 
-def worst_rows(rows, count=5):
+def worst_rows(rows, count=3):
     """Those from ENOUGH samples on whose sums are furthest off."""
     known = [r for r in rows if r["sum"] and r["spp"] >= ENOUGH]
     return sorted(known, key=lambda r: -abs(math.log(r["sum"])))[:count]
 
 
+def spread(rows, key):
+    """From the least to the largest of the means over scenes, of methods and numbers of samples."""
+    groups = {}
+    for r in rows:
+        groups.setdefault((r["method"], r["spp"]), []).append(r)
+    means = [mean for mean in (pooled(group, key) for group in groups.values()) if mean]
+    return f"{min(means):.2f}–{max(means):.2f}" if means else "–"
+
+
 def markdown(rows):
-    methods = list(dict.fromkeys(r["method"] for r in rows))
-    lines = ["| method | " + " | ".join(f"{spp} samples" for spp in LEVELS) + " | beyond 3 errors |",
-             "|---|" + "---|" * (len(LEVELS) + 1)]
-    for method in methods:
-        own = [r for r in rows if r["method"] == method]
-        cells = []
-        for spp in LEVELS:
-            here = [r for r in own if r["spp"] == spp]
-            cells.append(f"{_number(pooled(here, 'sum'))}, {_number(pooled(here, 'pixel'))}")
-        beyond = [r["beyond"] for r in own if r["spp"] >= ENOUGH]
-        share = f"{100 * sum(beyond) / len(beyond):.1f} %" if beyond else "–"
-        lines.append(f"| `{method}` | " + " | ".join(cells) + f" | {share} |")
-    text = (f"Stated error over the spread of {SEEDS} seeds, of sums and of pixels; geometric means"
-            f" over {len(SCENES)} scenes. A single ratio of a sum has an error of"
-            f" {1 / math.sqrt(2 * (SEEDS - 1)):.2f}. The last column counts sums from"
-            f" {ENOUGH} samples on. Furthest off there: ")
-    text += "; ".join(f"{r['scene']} `{r['method']}` at {r['spp']}: {_number(r['sum'])}"
-                      for r in worst_rows(rows)) + "."
-    return "\n".join([*lines, "", *textwrap.wrap(text, 100)]) + "\n"
+    beyond = {}
+    for r in rows:
+        if r["spp"] >= ENOUGH:
+            beyond.setdefault(r["method"], []).append(r["beyond"])
+    lines = []
+    for method in ("adaptive", "fd", None):
+        own = [r for r in rows if method in (None, r["method"])]
+        if own:
+            lines.append(f"{f'`{method}`' if method else 'all methods'} {spread(own, 'sum')} (sums),"
+                         f" {spread(own, 'pixel')} (pixels)")
+    text = (f"Stated errors over the spread of {SEEDS} seeds at {LEVELS[0]} to {LEVELS[-1]} samples,"
+            f" geometric means over {len(SCENES)} scenes: " + "; ".join(lines) + ".")
+    if beyond:
+        most = max(beyond, key=lambda name: sum(beyond[name]) / len(beyond[name]))
+        share = 100 * sum(beyond[most]) / len(beyond[most])
+        text += (f" From {ENOUGH} samples on at most {share:.1f} % of a method's sums (`{most}`) are"
+                 f" off by more than three errors; single scenes are furthest off at ")
+        text += ", ".join(f"{_number(r['sum'])} ({r['scene']}, `{r['method']}`)"
+                          for r in worst_rows(rows)) + "."
+    return "\n".join(textwrap.wrap(text, 100)) + "\n"
 
 
 @charts.chart(10, 4, columns=2, sharey=True)
