@@ -137,12 +137,14 @@ double samples_behind_pilot(double per_second, double left, int least) {
 }
 
 void extrapolate_variances(std::span<StepTrial> trials) {
-  for (size_t k = trials.size() - 2; k-- > 0;) {
-    const double next = trials[k + 1].variance, after = trials[k + 2].variance;
-    if (after <= 0) continue;
+  for (size_t k = trials.size() - 1; k-- > 0;) {
+    const double factor = trials[k + 1].step / trials[k].step;
+    const double own = trials[k].variance, next = trials[k + 1].variance;
+    // What the smaller step did not meet are edges.
+    trials[k].variance = own + factor * std::max(0.0, next - own);
+    if (k + 2 == trials.size() || !(trials[k + 2].variance > 0)) continue;
     // Noise that is not common to the two images has a variance of 1 / h^2, and none has more.
-    const double factor = trials[k + 2].step / trials[k + 1].step;
-    const double growth = std::clamp(next / after, 1.0, factor * factor);
+    const double growth = std::clamp(next / trials[k + 2].variance, 1.0, factor * factor);
     trials[k].variance = std::max(trials[k].variance, next * growth);
   }
 }

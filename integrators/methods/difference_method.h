@@ -10,8 +10,8 @@ struct StepTrial {
   double variance = 0;        // of one sample
   double squared_change = 0;  // of (D_h - D of the next smaller step)^2, minus its own variance
 };
-// Raises the variance at every step to what the two larger ones lead to expect: at a small step a
-// short pilot meets no edge and sees no variance, which grows as 1 / h. trials: by ascending step.
+// Raises the variance at every step to what the larger ones lead to expect: at a small step a short
+// pilot meets no edge and sees no variance, which grows as 1 / h. trials: by ascending step.
 void extrapolate_variances(std::span<StepTrial> trials);
 
 // The step of least expected squared error with that many samples. trials: by ascending step, each

@@ -328,6 +328,14 @@ TEST(Differences, VarianceThatAPilotHasNotMetIsExtrapolated) {
   for (int k = 0; k < 3; ++k) trials[k].variance = 0;
   extrapolate_variances(trials);
   for (int k = 0; k < 5; ++k) EXPECT_NEAR(trials[k].variance * trials[k].step, 1, 1e-12);
+  // Nor any but the largest, or not all of them, beside noise that all have.
+  for (int k = 0; k < 4; ++k) trials[k].variance = 0;
+  extrapolate_variances(trials);
+  for (int k = 0; k < 5; ++k) EXPECT_NEAR(trials[k].variance * trials[k].step, 1, 1e-12);
+  trials = trials_of(10, 1, 1);
+  trials[3].variance = 0.5 * trials[4].variance;
+  extrapolate_variances(trials);
+  EXPECT_NEAR(trials[3].variance, 2.5 * trials[4].variance, 1e-12);
   // No growth beyond that of two unrelated images, none without any variance.
   trials = trials_of(1, 0, 1);
   trials[3].variance = 1000;
