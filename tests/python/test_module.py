@@ -3,7 +3,6 @@
 import ast
 import glob
 import inspect
-import json
 import os
 import subprocess
 import sys
@@ -146,15 +145,3 @@ def test_examples_run(file, tmp_path):
     assert done.returncode == 0, done.stdout + done.stderr
     assert "leak" not in done.stderr
     assert list(tmp_path.glob("*.png"))
-
-
-# Cells are Python: nothing of Jupyter is needed to see whether they run.
-def test_the_notebook_runs(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    names = {"LIMN": ROOT}
-    with open(os.path.join(EXAMPLES, "first_steps.ipynb"), encoding="utf-8") as stream:
-        cells = json.load(stream)["cells"]
-    code = ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
-    assert len(code) > 3
-    for cell in code:
-        exec(compile(cell, "first_steps.ipynb", "exec"), names)  # noqa: S102
