@@ -149,13 +149,13 @@ class Bitmap final : public Texture {
   template <class S>
   Rgb<S> lookup(const Texels& texels, const std::array<S, 2>& uv) const {
     if (settings_.nearest) {
-      const Rgb<double> c = texels[nearest_texel({value(uv[0]), value(uv[1])})];
+      const Rgb<double> c = texels.texel(nearest(value(uv[0]), texels.width(), settings_.wrap),
+                                         nearest(value(uv[1]), texels.height(), settings_.wrap));
       return {c.r, c.g, c.b};
     }
     const Neighbours<S> x = neighbours(uv[0], texels.width(), settings_.wrap);
     const Neighbours<S> y = neighbours(uv[1], texels.height(), settings_.wrap);
-    std::array<Rgb<double>, 4> c;
-    texels.fetch(corners(x, y), c);
+    const std::array<Rgb<double>, 4> c = texels.square({x.first, x.second}, {y.first, y.second});
     Rgb<S> v;
     for (int k = 0; k < 3; ++k) {
       const S top = c[0][k] + x.share * (c[1][k] - c[0][k]);

@@ -42,19 +42,21 @@ void Texels::fill_floats(const std::vector<float>& floats, int channels) {
 
 template <class Number, class Of>
 void Texels::fill(int channels, const Of& of) {
-  auto& all = all_.emplace<Quads<Number>>();
-  all.reserve(count());
+  tiles_across_ = (static_cast<size_t>(width_) + kTile - 1) / kTile;
+  const size_t tiles_down = (static_cast<size_t>(height_) + kTile - 1) / kTile;
+  auto& all = all_.emplace<Quads<Number>>(tiles_across_ * tiles_down * kTile * kTile);
   for (size_t i = 0; i < count(); ++i) {
-    const size_t first = i * static_cast<size_t>(channels);
+    const size_t first = i * static_cast<size_t>(channels), width = static_cast<size_t>(width_);
     const size_t g = channels == 3 ? 1 : 0, b = channels == 3 ? 2 : 0;
-    all.push_back({of(first), of(first + g), of(first + b), Number(0.0f)});
+    all[place(static_cast<uint32_t>(i % width), static_cast<uint32_t>(i / width))] = {
+        of(first), of(first + g), of(first + b), Number(0.0f)};
   }
 }
 
 void Texels::sum_up() {
-  least_ = most_ = (*this)[0].r;
+  least_ = most_ = texel(0, 0).r;
   for (size_t i = 0; i < count(); ++i) {
-    const Rgb<double> texel = (*this)[i];
+    const Rgb<double> texel = in_order(i);
     mean_ += texel;
     for (int c = 0; c < 3; ++c) {
       mean_magnitude_ += std::fabs(texel[c]);
@@ -69,7 +71,7 @@ void Texels::sum_up() {
 Image Texels::image() const {
   Image image(width_, height_, 3);
   for (size_t i = 0; i < count(); ++i) {
-    const Rgb<double> texel = (*this)[i];
+    const Rgb<double> texel = in_order(i);
     for (int c = 0; c < 3; ++c)
       image.data[3 * i + static_cast<size_t>(c)] = static_cast<float>(texel[c]);
   }

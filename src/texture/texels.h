@@ -12,8 +12,10 @@
 
 namespace limn {
 
-// W by H texels of three channels, row 0 first; immutable. Bytes stay bytes (4 a texel), with a
-// table of the numbers that they stand for; else halves (8) if no value is lost, else floats (16).
+// W by H texels of three channels; immutable. Bytes stay bytes (4 a texel), with a table of the
+// numbers that they stand for; else halves (8) if no value is lost, else floats (16). They lie in
+// tiles of 4 x 4: one of bytes is a line of the cache, so that four neighbours lie in 1.6 lines on
+// average, where rows would take 2.1.
 class Texels {
  public:
   explicit Texels(const StoredImage& image);
@@ -23,21 +25,18 @@ class Texels {
   int height() const { return height_; }
   size_t count() const { return static_cast<size_t>(width_) * height_; }
 
-  // texels[i] is that with index at[i], in row-major order.
-  template <size_t N>
-  void fetch(const std::array<uint32_t, N>& at, std::array<Rgb<double>, N>& texels) const {
-    std::visit(
-        [&](const auto& all) {
-          for (size_t i = 0; i < N; ++i) {
-            const auto& t = all[at[i]];
-            texels[i] = {number(t[0]), number(t[1]), number(t[2])};
-          }
-        },
-        all_);
+  // Those of two columns in one row, then of the same in the other.
+  std::array<Rgb<double>, 4> square(const std::array<uint32_t, 2>& columns,
+                                    const std::array<uint32_t, 2>& rows) const {
+    std::array<size_t, 4> at;
+    for (size_t i = 0; i < 4; ++i) at[i] = place(columns[i % 2], rows[i / 2]);
+    std::array<Rgb<double>, 4> texels;
+    fetch(at, texels);
+    return texels;
   }
-  Rgb<double> operator[](size_t index) const {
+  Rgb<double> texel(uint32_t column, uint32_t row) const {
     std::array<Rgb<double>, 1> texel;
-    fetch<1>({static_cast<uint32_t>(index)}, texel);
+    fetch<1>({place(column, row)}, texel);
     return texel[0];
   }
   Image image() const;
@@ -52,17 +51,41 @@ class Texels {
   template <class Number>
   using Quads = HugePageVector<std::array<Number, 4>>;
 
+  static constexpr uint32_t kTile = 4;
+
+  Rgb<double> in_order(size_t i) const {
+    const auto width = static_cast<size_t>(width_);
+    return texel(static_cast<uint32_t>(i % width), static_cast<uint32_t>(i / width));
+  }
+
+  size_t place(uint32_t column, uint32_t row) const {
+    const size_t tile = static_cast<size_t>(row / kTile) * tiles_across_ + column / kTile;
+    return (tile * kTile + row % kTile) * kTile + column % kTile;
+  }
+  template <size_t N>
+  void fetch(const std::array<size_t, N>& at, std::array<Rgb<double>, N>& texels) const {
+    std::visit(
+        [&](const auto& all) {
+          for (size_t i = 0; i < N; ++i) {
+            const auto& t = all[at[i]];
+            texels[i] = {number(t[0]), number(t[1]), number(t[2])};
+          }
+        },
+        all_);
+  }
+
   double number(uint8_t byte) const { return table_[byte]; }
   static double number(float v) { return v; }
   static double number(Half v) { return v; }
 
-  // of(i): the i-th of the interleaved numbers.
+  // of(i): the i-th of the interleaved numbers, row 0 first.
   template <class Number, class Of>
   void fill(int channels, const Of& of);
   void fill_floats(const std::vector<float>& floats, int channels);
   void sum_up();
 
   int width_, height_;
+  size_t tiles_across_ = 0;
   std::variant<Quads<uint8_t>, Quads<Half>, Quads<float>> all_;
   std::array<float, 256> table_{};
   Rgb<double> mean_;

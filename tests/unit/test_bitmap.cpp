@@ -118,8 +118,8 @@ TEST(Bitmap, EightBitsAreSrgb) {
 TEST(Bitmap, TexelsStayAsTheyAreStored) {
   StoredImage stored{2, 1, 3, true, {0, 128, 255, 1, 2, 3}, {}};
   const Texels bytes(stored);
-  EXPECT_NEAR(bytes[0].g, 0.2158605, 1e-6);
-  EXPECT_EQ(bytes[0].b, 1);
+  EXPECT_NEAR(bytes.texel(0, 0).g, 0.2158605, 1e-6);
+  EXPECT_EQ(bytes.texel(0, 0).b, 1);
   EXPECT_EQ(bytes.least(), 0);
   EXPECT_NEAR(bytes.mean().b, (1 + 0.000910581) / 2, 1e-7);
   Image image(1, 2, 3);
@@ -129,6 +129,19 @@ TEST(Bitmap, TexelsStayAsTheyAreStored) {
   EXPECT_EQ(floats.least(), -3);
   image.data = {0.5f, 2, -3, 1024, 5, 6};
   EXPECT_EQ(Texels(image).image().data, image.data);
+}
+
+// Whole tiles and parts of them, in both directions.
+TEST(Bitmap, TexelsHaveColumnsAndRows) {
+  Image image(9, 6, 3);
+  for (size_t i = 0; i < image.data.size(); ++i) image.data[i] = static_cast<float>(i) + 0.1f;
+  const Texels texels(image);
+  EXPECT_EQ(texels.image().data, image.data);
+  const auto four = texels.square({3, 8}, {5, 0});
+  for (const auto& [texel, column, row] :
+       {std::tuple{four[0], 3, 5}, {four[1], 8, 5}, {four[2], 3, 0}, {four[3], 8, 0}}) {
+    EXPECT_EQ(texel.r, image.data[static_cast<size_t>(3 * (9 * row + column))]);
+  }
 }
 
 // Numbers take the luminance of colours.
