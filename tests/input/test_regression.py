@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""tools/mitsuba/regression.py on a folder that is made here, and, where MITSUBA_DATA names a clone of
-mitsuba-data, on its tests.
+"""tools/mitsuba/regression.py and derivatives.py on folders that are made here, and, where
+MITSUBA_DATA names a clone of mitsuba-data, the first on its tests.
 
     test_regression.py LIMN
 """
@@ -20,18 +20,54 @@ SCENE = """<scene version="3.0.0"><integrator type="path"/><sensor type="perspec
 LIMN = sys.argv.pop() if len(sys.argv) > 1 else None
 
 
-def regression(folder, *options):
-    tool = os.path.join(ROOT, "tools", "mitsuba", "regression.py")
+def run(tool, folder, *options):
+    tool = os.path.join(ROOT, "tools", "mitsuba", tool)
     return subprocess.run([sys.executable, tool, folder, "--limn", LIMN, *options],
                           capture_output=True, text=True, check=False)
 
 
+def regression(folder, *options):
+    return run("regression.py", folder, *options)
+
+
+def skip_without_numpy(test):
+    try:
+        import numpy  # noqa: F401
+    except ImportError:
+        test.skipTest("numpy is not installed")
+
+
+class Derivatives(unittest.TestCase):
+    def test_checks_kinds_and_goes_on(self):
+        skip_without_numpy(self)
+        with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryDirectory() as out:
+            for name, bsdf in (("matt", "diffuse"), ("mirror", "conductor")):
+                with open(os.path.join(folder, name + ".xml"), "w", encoding="utf-8") as stream:
+                    stream.write(SCENE.format(0.5, '<shape type="rectangle" id="wall"><transform '
+                                              'name="to_world"><translate z="4"/></transform>'
+                                              f'<bsdf type="{bsdf}"/></shape>'))
+            # Nothing takes as little as this, so only the first runs are made.
+            options = ["-o", out, "--film", "8", "--seconds", "1e-9"]
+            done = run("derivatives.py", folder, *options)
+            self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+            self.assertRegex(done.stdout, r"matt.xml +forward wall.bsdf.reflectance 64: agree")
+            self.assertRegex(done.stdout, r"\nsensor.fov +[0-2] ")
+            self.assertIn("in 1 scenes (1 more have smooth lobes)", done.stdout)
+            again = run("derivatives.py", folder, *options)
+            self.assertNotIn(" 64: ", again.stdout)
+            file = os.path.join(out, "results.json")
+            with open(file, encoding="utf-8") as stream:
+                text = stream.read()
+            with open(file, "w", encoding="utf-8") as stream:
+                stream.write(text.replace('"verdict": "agree"', '"verdict": "disagree"', 1))
+            wrong = run("derivatives.py", folder, *options)
+            self.assertEqual(wrong.returncode, 1, wrong.stdout)
+            self.assertIn(" checks agree, 1 disagree", wrong.stdout)
+
+
 class Regression(unittest.TestCase):
     def setUp(self):
-        try:
-            import numpy  # noqa: F401
-        except ImportError:
-            self.skipTest("numpy is not installed")
+        skip_without_numpy(self)
 
     def write(self, folder, name, radiance, reference, more=""):
         """A scene, and references of another radiance and of a variance of 0.01."""
