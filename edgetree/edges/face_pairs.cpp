@@ -95,7 +95,7 @@ struct LeafFans {
     for (int k = 0; k < 3; ++k)
       for (int j = 0; j < 3; ++j)
         for (uint32_t lane = 0; lane < BoxTree::kLeaf; ++lane)
-          same[lane] |= (corners[j][lane] == other[k]) & (other[k] != kNone);
+          same[lane] |= uint32_t{corners[j][lane] == other[k]} & uint32_t{other[k] != kNone};
     uint32_t bits = 0;
     for (uint32_t lane = 0; lane < BoxTree::kLeaf; ++lane) bits |= same[lane] << lane;
     return bits;

@@ -321,20 +321,20 @@ int pilot_samples(int spp) {
 // A run of 1.2 s without a pilot, for which an eighth is too short, has 1.2 to 11 times the squared
 // error of one with four samples.
 int pilot_samples_in_time(int spp, double each, double seconds, double left) {
-  constexpr double kMost = 0.3;  // of what is left; not tuned
+  constexpr double kMostTime = 0.3;  // of what is left; not tuned
   const int fitting = static_cast<int>(std::min(seconds / 8 / each, 1e6));
-  if ((kLeastPilot - 1) * each > kMost * left) return 0;
+  if ((kLeastPilot - 1) * each > kMostTime * left) return 0;
   return std::min(spp, std::max(fitting, kLeastPilot)) / 2 * 2;
 }
 
 PilotSize pilot_size(double each, size_t pixels, int spp, double seconds, double left) {
-  constexpr size_t kFewest = 64;  // pixels that tell terms apart; not tuned
-  constexpr double kMost = 0.3;   // as above
+  constexpr size_t kFewest = 64;     // pixels that tell terms apart; not tuned
+  constexpr double kMostTime = 0.3;  // as above
   const double fitting = std::min(seconds / (each * static_cast<double>(pixels)), 1e6);
   if (fitting >= kLeastPilot) return {pixels, std::min(spp, static_cast<int>(fitting) / 2 * 2)};
   const auto some = static_cast<size_t>(std::max(seconds, 0.0) / (kLeastPilot * each));
   const size_t chosen = std::clamp(some, std::min(kFewest, pixels), pixels);
-  if (kLeastPilot * each * static_cast<double>(chosen) > kMost * left) return {0, 0};
+  if (kLeastPilot * each * static_cast<double>(chosen) > kMostTime * left) return {0, 0};
   return {chosen, kLeastPilot};
 }
 

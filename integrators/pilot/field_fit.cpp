@@ -20,7 +20,6 @@ struct Basis {
 };
 constexpr Basis kBases[] = {{0, 6}, {0, 3}, {3, 3}};
 constexpr int kRadii[] = {1, 2, 4};
-constexpr int kFits = static_cast<int>(std::size(kBases) * std::size(kRadii));
 constexpr int kHeld = -1;
 constexpr int kJudgeRadius = 4;
 // A fit must leave less than this share of the variance. Covariances of rare edges mislead looser

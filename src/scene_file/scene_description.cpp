@@ -42,7 +42,9 @@ class Describer {
     for (const XmlAttribute& id : root_references_) {
       errors_.keep([&] { add_reference(find(id.value, id.where)); });
     }
-    for (const auto& [name, id] : aliases_) errors_.keep([&] { find(id.value, id.where); });
+    for (const auto& alias : aliases_) {
+      errors_.keep([&] { find(alias.second.value, alias.second.where); });
+    }
     return std::move(scene_);
   }
 

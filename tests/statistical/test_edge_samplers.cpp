@@ -261,7 +261,9 @@ class EdgeSamplers : public testing::TestWithParam<std::string> {
 
 TEST_P(EdgeSamplers, DrawAsTheyState) {
   Rng rng(14, 0, 0);
-  for (const auto& [name, input] : test_inputs()) {
+  for (const NamedInput& named : test_inputs()) {
+    const std::string& name = named.name;  // no binding: Clang 14 lets lambdas capture none
+    const EdgeSamplerInput& input = named.input;
     const auto sampler = make(input);
     for (int i = 0; i < 6; ++i) {
       const EdgeQuery q = random_query(i, rng);
@@ -308,7 +310,9 @@ TEST_P(EdgeSamplers, DrawAsTheyState) {
 TEST_P(EdgeSamplers, SeveralAtOnceAreDrawnAsTheyState) {
   Rng rng(20, 0, 0);
   std::vector<std::optional<EdgeSample>> samples;
-  for (const auto& [name, input] : test_inputs()) {
+  for (const NamedInput& named : test_inputs()) {
+    const std::string& name = named.name;  // no binding: Clang 14 lets lambdas capture none
+    const EdgeSamplerInput& input = named.input;
     const auto sampler = make(input);
     for (const int several : {2, 7}) {
       const EdgeQuery q = random_query(rng);
@@ -373,7 +377,9 @@ TEST_P(EdgeSamplers, OneOfSeveralIsOneAlone) {
 
 TEST_P(EdgeSamplers, MissNoEdgeThatContributes) {
   Rng rng(15, 0, 0);
-  for (const auto& [name, input] : test_inputs()) {
+  for (const NamedInput& named : test_inputs()) {
+    const std::string& name = named.name;  // no binding: Clang 14 lets lambdas capture none
+    const EdgeSamplerInput& input = named.input;
     const auto sampler = make(input);
     for (int i = 0; i < 10; ++i) {
       const EdgeQuery q = random_query(rng);
@@ -425,7 +431,9 @@ TEST_P(EdgeSamplers, DensityAlongTheEdge) {
 // The estimator f |J| / (P p) against the sum of all edges' integrals.
 TEST_P(EdgeSamplers, EstimateTheSumOverAllEdges) {
   Rng rng(17, 0, 0);
-  for (const auto& [name, input] : test_inputs()) {
+  for (const NamedInput& named : test_inputs()) {
+    const std::string& name = named.name;  // no binding: Clang 14 lets lambdas capture none
+    const EdgeSamplerInput& input = named.input;
     const auto sampler = make(input);
     for (int i = 0; i < 6; ++i) {
       EdgeQuery q = random_query(i, rng);

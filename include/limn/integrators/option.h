@@ -26,15 +26,15 @@ struct Option {
   Task task = Task::kGradient;           // of a method, or of the terms
   bool of_samples = false;               // refused where points of the film take no samples
 
-  constexpr Option or_zero(const char* what) const { return with(&Option::unset, what); }
-  constexpr Option typed(const char* what) const { return with(&Option::type, what); }
-  constexpr Option samples() const { return with(&Option::of_samples, true); }
   template <class T>
   constexpr Option with(T Option::*field, T value) const {
     Option row = *this;
     row.*field = value;
     return row;
   }
+  constexpr Option or_zero(const char* what) const { return with(&Option::unset, what); }
+  constexpr Option typed(const char* what) const { return with(&Option::type, what); }
+  constexpr Option samples() const { return with(&Option::of_samples, true); }
 };
 
 // Rows of common kinds.
