@@ -126,7 +126,7 @@ std::vector<Moments> forward_sums(const Scene& scene, std::span<const Parameter>
         parameters.subspan(first).first(std::min<size_t>(kLanes, parameters.size() - first));
     std::vector<std::unique_ptr<SampleEstimator>> estimators;
     estimators.push_back(std::make_unique<TermEstimator>(
-        scene, some, types, computed, sampler, settings.threads, nullptr, nullptr, closed));
+        scene, some, types, computed, sampler, settings.threads, TermExtras{.closed = closed}));
     const Stopwatch watch;
     run_batches(estimators, settings, watch, [&](const Batch& batch, const auto& sums) {
       const std::vector<std::vector<double>>& images = sums[0].images;

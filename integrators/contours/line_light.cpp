@@ -261,8 +261,9 @@ void LineLight::add_polygon(const EmitterHull& hull, ShapeId id, std::vector<Fac
 // less what is not. w: of the pole. piece(line, from, to): for one radian of azimuth.
 template <class V, class Piece>
 V LineLight::sum_over_lines(const ContourPoint& at, const Pencil& pencil,
-                            std::span<const Vec3d> planes, int w, const V* all, int count,
-                            double offset, const Piece& piece) const {
+                            std::span<const Vec3d> planes, int w, const V* all, LineChoice choice,
+                            const Piece& piece) const {
+  auto [count, offset] = choice;
   Scratch& own = scratch();
   Isolines& lines = own.isolines;
   const bool open = !all || w != 0;
@@ -312,7 +313,7 @@ double LineLight::openness(const ContourPoint& at, double offset) const {
   list(at, {}, nullptr);
   const int w = contours_.count(at, at.up, nullptr);
   const double sum = sum_over_lines<double>(
-      at, pencil_around(at.up), {&at.up, 1}, w, nullptr, options_.lines, offset,
+      at, pencil_around(at.up), {&at.up, 1}, w, nullptr, {options_.lines, offset},
       [](const Isolines::Line&, const Azimuth& from, const Azimuth& to) { return from.c - to.c; });
   return sum / (2 * kPi);
 }
@@ -324,7 +325,7 @@ double LineLight::ambient_occlusion(const ContourPoint& at, const Vec3d& n, doub
   const int w = contours_.count(at, pencil.pole, nullptr);
   const double along = dot(n, pencil.pole);
   const double sum = sum_over_lines<double>(
-      at, pencil, planes, w, nullptr, options_.lines, offset,
+      at, pencil, planes, w, nullptr, {options_.lines, offset},
       [&](const Isolines::Line& line, const Azimuth& from, const Azimuth& to) {
         return cosine_piece(along, pencil.pole == n ? 0 : dot(n, line.r), from, to);
       });
@@ -339,7 +340,7 @@ Rgb<double> LineLight::sky_light(const Receiver& receiver, double offset) const 
   const int w = contours_.count(at, pencil.pole, nullptr);
   const Rgb<double> radiance = sky_->radiance(at.up);
   const double sum =
-      sum_over_lines<double>(at, pencil, planes, w, nullptr, options_.lines, offset,
+      sum_over_lines<double>(at, pencil, planes, w, nullptr, {options_.lines, offset},
                              [&](const Isolines::Line&, const Azimuth& from, const Azimuth& to) {
                                return cosine_piece(1, 0, from, to);
                              });
@@ -365,7 +366,7 @@ Rgb<double> LineLight::map_light(const Receiver& receiver, double offset) const 
   const Rgb<double> scale = receiver.scattering.eval(receiver.n);
   const Vec3d planes[] = {at.up};
   const Rgb<double> sum = sum_over_lines<Rgb<double>>(
-      at, pencil, planes, w, nullptr, options_.lines, offset,
+      at, pencil, planes, w, nullptr, {options_.lines, offset},
       [&](const Isolines::Line& line, const Azimuth& a, const Azimuth& b) {
         return cosine(columns_->meridian(line.r), line.r, a, b);
       });
@@ -412,7 +413,7 @@ Rgb<double> LineLight::emitter_light(const Emitter& emitter, const Receiver& rec
   if (own.arcs.empty()) return w == 0 ? f * emitter.radiance * all : Rgb<double>{};
   const double along = dot(receiver.n, pencil.pole);
   const double sum = sum_over_lines<double>(
-      at, pencil, own.planes, w, &all, emitter_lines, offset,
+      at, pencil, own.planes, w, &all, {emitter_lines, offset},
       [&](const Isolines::Line& line, const Azimuth& from, const Azimuth& to) {
         return cosine_piece(along, dot(receiver.n, line.r), from, to);
       });

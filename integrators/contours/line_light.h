@@ -93,9 +93,13 @@ class LineLight {
   Rgb<double> emitter_light(const Emitter& emitter, const Receiver& receiver, double offset) const;
   Rgb<double> sky_light(const Receiver& receiver, double offset) const;
   Rgb<double> map_light(const Receiver& receiver, double offset) const;
+  struct LineChoice {
+    int count;
+    double offset;  // of the first line, in [0, 1) of their distance
+  };
   template <class V, class Piece>
   V sum_over_lines(const ContourPoint& at, const Pencil& pencil, std::span<const Vec3d> planes,
-                   int w, const V* all, int count, double offset, const Piece& piece) const;
+                   int w, const V* all, LineChoice choice, const Piece& piece) const;
 
   const Scene& scene_;
   Contours contours_;

@@ -115,8 +115,8 @@ class TermJob {
       const auto some =
           std::span(parameters_).subspan(k).first(std::min<size_t>(kLanes, parameters_.size() - k));
       passes_.push_back(std::make_unique<TermEstimator>(
-          scene, some, types_, computed_, method.sampler, settings.threads, visible,
-          method.warps ? &warping : nullptr, method.closed, moves_film_));
+          scene, some, types_, computed_, method.sampler, settings.threads,
+          TermExtras{visible, method.warps ? &warping : nullptr, method.closed, moves_film_}));
     }
   }
 
@@ -483,8 +483,8 @@ class TermJob {
     for (int first = 0; first < estimator.lanes(); first += kMostFilmParameters) {
       const auto some =
           parameters.subspan(first, std::min(kMostFilmParameters, estimator.lanes() - first));
-      TermEstimator two(scene_, some, types_, computed_, method_.sampler, settings.threads, nullptr,
-                        nullptr, false, true);
+      TermEstimator two(scene_, some, types_, computed_, method_.sampler, settings.threads,
+                        {.moved_film = true});
       if (two.motion_rates().still()) continue;
       const FilmFit part = fit_film(two, plan, look, settings, budget.watch);
       if (part.motion.empty()) continue;

@@ -61,22 +61,21 @@ bool draws_edges(const std::vector<const TermType*>& types, const std::vector<bo
 TermEstimator::TermEstimator(const Scene& scene, std::span<const Parameter> parameters,
                              const std::vector<const TermType*>& types,
                              const std::vector<bool>& computed, const EdgeSamplerType& sampler,
-                             int threads, std::shared_ptr<const FilmRegions> visible,
-                             const Warping* warping, bool closed, bool moved_film)
+                             int threads, const TermExtras& extras)
     : changed_(changed_terms(types, computed, moved_in(scene, parameters))),
       scene_(seeded(scene, parameters)),
       lanes_(static_cast<int>(parameters.size())),
       lane_scale_(natural_steps(parameters)),
       traced_(scene_, threads,
-              {.closed = closed,
-               .edges = draws_edges(types, changed_) || warping,
-               .faces = visible ? visible->faces() : nullptr}),
+              {.closed = extras.closed,
+               .edges = draws_edges(types, changed_) || extras.warping,
+               .faces = extras.visible ? extras.visible->faces() : nullptr}),
       camera_(scene_.camera),
       filter_(scene_.film.filter),
-      visible_(std::move(visible)),
-      input_(traced_.context(), lanes_, lane_scale_, sampler, threads, warping != nullptr),
+      visible_(extras.visible),
+      input_(traced_.context(), lanes_, lane_scale_, sampler, threads, extras.warping != nullptr),
       types_(types),
-      moves_film_(moved_film),
+      moves_film_(extras.moved_film),
       rates_(scene_, lanes_, lane_scale_),
       turning_(turning_about_axes(lane_scale_, lanes_)) {
   input_.visible = visible_.get();
@@ -88,8 +87,8 @@ TermEstimator::TermEstimator(const Scene& scene, std::span<const Parameter> para
     vertices_ = vertices_ || terms_[slot]->uses_vertices();
   }
   const bool moved = moved_in(scene, parameters).any();
-  if (!moved && !closed) values_ = std::make_unique<ValuePaths>(traced_.context(), parameters);
-  if (warping && moved) {
+  if (!moved && !extras.closed) values_.reset(new ValuePaths(traced_.context(), parameters));
+  if (const Warping* warping = extras.warping; warping && moved) {
     warp_field_ = std::make_unique<WarpField>(scene_, traced_.context().tracer, input_.edges(),
                                               warping->options, warping->unbiased);
   }
@@ -150,10 +149,11 @@ class TermEstimator::VertexTerms {
     const Rgb<double> weight = value(throughput);
     if (sink_.log()) log_vertex(*sink_.log(), surface, scattering, weight, bounces);
     const Bsdf::Lobes& lobes = scattering.bsdf().lobes();
-    if (lobes.above) add_side(surface, scattering, weight, motion, step, bounces, key, false);
+    const Arrival arrival{weight, motion, step, bounces, key};
+    if (lobes.above) add_side(surface, scattering, arrival, false);
     if (!lobes.below) return;
     const auto other = beyond(estimator_.scene_, surface, scattering.wi());
-    add_side(other, scattering, weight, motion, step, bounces, key, true);
+    add_side(other, scattering, arrival, true);
   }
 
   const PixelCounts& counts() const { return counts_; }
@@ -161,10 +161,18 @@ class TermEstimator::VertexTerms {
   const Rgb<Lanes>& turned(size_t slot) const { return turned_[slot]; }
 
  private:
+  // How the path came to a vertex.
+  struct Arrival {
+    const Rgb<double>& weight;
+    const DirectionMotion* motion;
+    const PathStep& step;
+    int bounces;
+    const Rng& key;
+  };
   // below: what passes the surface, from beyond() it.
   void add_side(const SurfacePoint<Dual>& surface, const Scattering<Dual>& scattering,
-                const Rgb<double>& weight, const DirectionMotion* motion, const PathStep& step,
-                int bounces, const Rng& key, bool below) {
+                const Arrival& arrival, bool below) {
+    const auto& [weight, motion, step, bounces, key] = arrival;
     PathVertex vertex =
         plain_vertex(surface, scattering, estimator_.scene_.shading, bounces, step, key, below);
     vertex.throughput = weight;
@@ -172,17 +180,17 @@ class TermEstimator::VertexTerms {
     TurnedVertex turned;
     if (held_) turned = turned_at(surface, motion, bounces);
     VertexLanes lanes(setting_, vertex, surface, held_ ? &turned : nullptr);
-    const double urgency = urgency_at(surface, weight, bounces);
+    const double factor = factor_at(surface, weight, bounces);
     for (size_t slot = 0; slot < estimator_.slots(); ++slot) {
       const Term* term = estimator_.terms_[slot].get();
       if (!term || !term->uses_vertices()) continue;
       if (skipped(slot, key)) continue;
       const int planned = std::max(1, static_cast<int>(counts_[slot]));
-      const int samples = rounded(planned * urgency, key.at(Purpose::kVertexSplit, bounces), slot);
+      const int samples = rounded(planned * factor, key.at(Purpose::kVertexSplit, bounces), slot);
       if (samples == 0) continue;
       const Stopwatch watch;
       TermCost& cost = sink_.cost(slot);
-      lanes.start(cost, estimator_.plan_.survival * (1 / (urgency * counts_[slot])));
+      lanes.start(cost, estimator_.plan_.survival * (1 / (factor * counts_[slot])));
       Rgb<Lanes> sum;
       try {
         term->add_at_vertex(vertex, samples, lanes);
@@ -190,7 +198,7 @@ class TermEstimator::VertexTerms {
       } catch (const UntraceableRay&) {
         sum = grey(kNotFinite);
       }
-      const double share = 1 / urgency;
+      const double share = 1 / factor;
       for (int c = 0; c < 3; ++c) {
         sums_[slot][c] += sum[c] * share;
         turned_[slot][c] += turned.sum[c] * share;
@@ -209,14 +217,14 @@ class TermEstimator::VertexTerms {
     return turned;
   }
   // How many samples the vertex takes in place of one, on average: as large as what they may add.
-  double urgency_at(const SurfacePoint<Dual>& surface, const Rgb<double>& throughput, int bounces) {
+  double factor_at(const SurfacePoint<Dual>& surface, const Rgb<double>& throughput, int bounces) {
     constexpr double kLeast = 0.125, kMost = 32;  // not tuned
     if (!estimator_.splits_now(held_ != nullptr)) return 1;
     const Vec3d p = value(surface.p);
     if (bounces == 0) first_ = p;
     const Vec3<Lanes> velocity{surface.p.x.d, surface.p.y.d, surface.p.z.d};
-    const double urgency = luminance(throughput) * estimator_.rates_.urgency(p, velocity, first_);
-    return urgency < kMost ? std::max(urgency, kLeast) : kMost;  // also of what is not a number
+    const double factor = luminance(throughput) * estimator_.rates_.urgency(p, velocity, first_);
+    return factor < kMost ? std::max(factor, kLeast) : kMost;  // also of what is not a number
   }
   // A whole number with this mean.
   static int rounded(double mean, Rng rng, size_t slot) {
@@ -243,9 +251,9 @@ class TermEstimator::VertexTerms {
 
 // Paths on their way into the sums: those of several samples go side by side, and are added in
 // their order.
-class TermEstimator::Convoy {
+class TermEstimator::PathBatch {
  public:
-  Convoy(const TermEstimator& estimator, SampleSink& sink) : estimator_(estimator), sink_(sink) {
+  PathBatch(const TermEstimator& estimator, SampleSink& sink) : estimator_(estimator), sink_(sink) {
     walks_.reserve(kMost);
     vertices_.reserve(kMost);
   }
@@ -291,17 +299,17 @@ void TermEstimator::add_pixels(std::span<const KeyedSample> samples, SampleSink&
     return;
   }
   if (values_) return add_values(samples, sink);
-  Convoy convoy(*this, sink);
+  PathBatch batch(*this, sink);
   for (const auto& [at, key] : samples) {
     const PixelCounts counts = plan_.counts_at(at);
     const int paths = paths_ ? static_cast<int>(counts[pixel_slot_]) : 1;
     const int all = paths * places_of_path();
     for (int i = 0; i < all; ++i) {
-      convoy.add({at, i >= paths}, key.path(i % paths), 1.0 / all,
-                 i == 0 && vertices_ ? &counts : nullptr);
+      batch.add({at, i >= paths}, key.path(i % paths), 1.0 / all,
+                i == 0 && vertices_ ? &counts : nullptr);
     }
   }
-  convoy.finish();
+  batch.finish();
   add_moved_pixels(samples, sink);
 }
 

@@ -26,17 +26,21 @@ struct Warping {
   bool unbiased = false;
 };
 
+// What few methods have.
+struct TermExtras {
+  std::shared_ptr<const FilmRegions> visible = nullptr;  // of the film
+  const Warping* warping = nullptr;                      // null where directions are not warped
+  bool closed = false;  // what surfaces scatter is known in closed form, see closed_light.h
+  bool moved_film = false;
+};
+
 class TermEstimator final : public SampleEstimator {
  public:
   // parameters: at most kLanes. types: terms_of() the scene; slots are indices into it. computed:
-  // one per type; of these only changed_terms() have samples. visible: of the film, or null.
-  // warping: null where directions are not warped.
-  // closed: what surfaces scatter is known in closed form, see closed_light.h.
+  // one per type; of these only changed_terms() have samples.
   TermEstimator(const Scene& scene, std::span<const Parameter> parameters,
                 const std::vector<const TermType*>& types, const std::vector<bool>& computed,
-                const EdgeSamplerType& sampler, int threads,
-                std::shared_ptr<const FilmRegions> visible = nullptr,
-                const Warping* warping = nullptr, bool closed = false, bool moved_film = false);
+                const EdgeSamplerType& sampler, int threads, const TermExtras& extras = {});
   TermEstimator(const TermEstimator&) = delete;
   TermEstimator& operator=(const TermEstimator&) = delete;
 
@@ -94,7 +98,7 @@ class TermEstimator final : public SampleEstimator {
  private:
   class VertexTerms;
   class VertexMotions;
-  class Convoy;
+  class PathBatch;
   struct Path {
     PathSums<Dual> found;
     bool finite;

@@ -323,10 +323,8 @@ bool CameraEdges::jump_at(const FilmEdgePoint& point, const Rng& key, RayCount& 
   if (!follow_mirrors(context_, view.chain, ray, 0, rays, sight)) return false;
   EdgeView beyond;
   if (!view_edge(mesh, edge.id, t, sight.from, beyond)) return false;
-  if (!edge_difference(context_, mesh, beyond, sight.last(), 0,
-                       std::numeric_limits<double>::infinity(), sight.bounces, key, rays, jump)) {
-    return false;
-  }
+  const EdgeViewer viewer{sight.last(), sight.bounces, key};
+  if (!edge_difference(context_, mesh, beyond, viewer, rays, jump)) return false;
   jump = jump * sight.share;
   by = sight.by;
   return true;

@@ -178,10 +178,11 @@ Ray ending_on(Ray ray, FaceRef face, double distance) {
   return ray;
 }
 
-// Across an edge inside of a face, where the face's texture jumps.
-bool texture_difference(const PathContext& context, const FacesAround& around, const EdgeView& view,
-                        const Ray& ray, bool known_to_be_seen, RadianceBeside& beside,
-                        RayCount& rays, Rgb<double>& jump) {
+// Starts both sides of an edge inside of a face, where the face's texture jumps. False if the edge
+// is hidden.
+bool start_beside_texture(const PathContext& context, const FacesAround& around,
+                          const EdgeView& view, const Ray& ray, bool known_to_be_seen,
+                          RadianceBeside& beside, RayCount& rays) {
   const FaceRef face = around.faces[0];
   if (ray.skip_emitters && context.scene.shape(face.shape).is_emitter) return false;
   if (!known_to_be_seen) {
@@ -192,22 +193,23 @@ bool texture_difference(const PathContext& context, const FacesAround& around, c
   const bool positive = dot(side.into, view.side) > 0;
   beside.start_on_face(positive ? 1 : 0, around, side);
   beside.start_on_face(positive ? 0 : 1, around, {face, -side.into, side.rounding});
-  jump = beside.jump();
   return true;
 }
 
 // What edge_difference finds where nothing at all may lie before the edge. ray: to it.
 bool difference_in_sight(const PathContext& context, const EdgeMesh& mesh, const EdgeView& view,
-                         Ray ray, int bounces, const Rng& key, RayCount& rays, Rgb<double>& jump,
-                         const RadiancePart& part, const FaceRef* known_behind) {
+                         Ray ray, const EdgeViewer& viewer, RayCount& rays, Rgb<double>& jump) {
+  const RadiancePart& part = viewer.part;
   if (view.distance > ray.t_max) return false;
   const FacesAround around = mesh.around(view.id.edge);
   // Both sides share their random numbers: where they hardly differ, so do their estimates.
-  RadianceBeside beside(context, view, mesh.of_texture(), bounces,
-                        key.at(Purpose::kEdgeSide, bounces), rays, part);
+  RadianceBeside beside(context, view, mesh.of_texture(), viewer.bounces,
+                        viewer.key.at(Purpose::kEdgeSide, viewer.bounces), rays, part);
   if (mesh.of_texture()) {
-    return texture_difference(context, around, view, ray, known_behind != nullptr, beside, rays,
-                              jump);
+    const bool known = viewer.known_behind != nullptr;
+    if (!start_beside_texture(context, around, view, ray, known, beside, rays)) return false;
+    jump = beside.jump();
+    return true;
   }
   fetch_faces(context.scene, around);
   ray.skip_faces = around.all;
@@ -222,9 +224,9 @@ bool difference_in_sight(const PathContext& context, const EdgeMesh& mesh, const
   fetch_corners(context.scene, around);  // while the ray is traced
   Hit behind;
   bool found;
-  if (known_behind) {
-    behind.face = *known_behind;
-    found = known_behind->shape.valid();
+  if (viewer.known_behind) {
+    behind.face = *viewer.known_behind;
+    found = behind.face.shape.valid();
   } else {
     ++rays.closest;
     found =
@@ -260,20 +262,17 @@ bool view_from(const Vec3d& p, EdgeView& view) {
 }  // namespace
 
 bool edge_difference(const PathContext& context, const EdgeMesh& mesh, const EdgeView& view,
-                     FaceRef start, double t_min, double t_max, int bounces, const Rng& key,
-                     RayCount& rays, Rgb<double>& jump, const RadiancePart& part,
-                     const FaceRef* known_behind) {
+                     const EdgeViewer& viewer, RayCount& rays, Rgb<double>& jump) {
   Ray ray{view.p, view.omega};
-  ray.t_min = t_min;
-  ray.t_max = t_max;
-  ray.start = start;
-  ray.skip_emitters = bounces == 0 && context.scene.hide_emitters;
-  if (difference_in_sight(context, mesh, view, ray, bounces, key, rays, jump, part, known_behind))
-    return true;
+  ray.t_min = viewer.t_min;
+  ray.t_max = viewer.t_max;
+  ray.start = viewer.start;
+  ray.skip_emitters = viewer.bounces == 0 && context.scene.hide_emitters;
+  if (difference_in_sight(context, mesh, view, ray, viewer, rays, jump)) return true;
   // What regions emit is seen directly alone, and is no part of what comes straight through.
-  if (!context.straight_ways || part.region) return false;
+  if (!context.straight_ways || viewer.part.region) return false;
   ray.skip_faces = mesh.around(view.id.edge).all;
-  StraightWay way{view.p, start, bounces};
+  StraightWay way{view.p, viewer.start, viewer.bounces};
   EdgeView beyond = view;
   Hit hit;
   while (++rays.closest, context.tracer.closest(ending_on(ray, {}, beyond.distance), hit)) {
@@ -281,8 +280,8 @@ bool edge_difference(const PathContext& context, const EdgeMesh& mesh, const Edg
     ray = {beyond.p, beyond.omega};
     ray.start = way.start;
     ray.skip_faces = mesh.around(view.id.edge).all;
-    if (difference_in_sight(context, mesh, beyond, ray, way.bounces, key, rays, jump, {},
-                            nullptr)) {
+    const EdgeViewer straight{way.start, way.bounces, viewer.key};
+    if (difference_in_sight(context, mesh, beyond, ray, straight, rays, jump)) {
       jump = jump * way.share;
       return true;
     }

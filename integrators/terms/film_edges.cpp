@@ -158,9 +158,11 @@ bool FilmEdges::jump_at(const FilmEdgePoint& point, const Rng& key, RayCount& ra
   EdgeView view;
   if (!view_edge(mesh, edge.id, t, p, view)) return false;
   const double cosine = dot(view.omega, value(camera.forward));
-  return edge_difference(context_, mesh, view, {}, camera.near_clip / cosine,
-                         camera.far_clip / cosine, 0, key, rays, jump, {},
-                         edge.beside ? &*edge.beside : nullptr);
+  const FaceRef* known_behind = edge.beside ? &*edge.beside : nullptr;
+  return edge_difference(
+      context_, mesh, view,
+      {{}, 0, key, {}, known_behind, camera.near_clip / cosine, camera.far_clip / cosine}, rays,
+      jump);
 }
 
 }  // namespace limn

@@ -100,11 +100,8 @@ bool mirrored_difference(const PathContext& context, const PathVertex& vertex, c
   if (!follow_mirrors(context, draw.way->chain, ray, vertex.bounces + 1, rays, sight)) return false;
   EdgeView view;
   if (!view_edge(draw.mesh, draw.sample.edge, draw.sample.t, sight.from, view)) return false;
-  if (!edge_difference(context, draw.mesh, view, sight.last(), 0,
-                       std::numeric_limits<double>::infinity(), sight.bounces, draw.key, rays, jump,
-                       draw.part)) {
-    return false;
-  }
+  const EdgeViewer viewer{sight.last(), sight.bounces, draw.key, draw.part};
+  if (!edge_difference(context, draw.mesh, view, viewer, rays, jump)) return false;
   jump = jump * sight.share;
   form.by = sight.by;
   return true;
@@ -139,11 +136,9 @@ void add_edge_point(const PathContext& context, const PathVertex& vertex, const 
   }
   RayCount rays;
   Rgb<double> jump;
-  const bool visible = draw.way
-                           ? mirrored_difference(context, vertex, draw, ray, rays, form, jump)
-                           : edge_difference(context, draw.mesh, view, vertex.surface.start(), 0,
-                                             std::numeric_limits<double>::infinity(),
-                                             vertex.bounces + 1, draw.key, rays, jump, draw.part);
+  const EdgeViewer viewer{vertex.surface.start(), vertex.bounces + 1, draw.key, draw.part};
+  const bool visible = draw.way ? mirrored_difference(context, vertex, draw, ray, rays, form, jump)
+                                : edge_difference(context, draw.mesh, view, viewer, rays, jump);
   cost.add(rays);
   const Rgb<double> amount = visible ? scattered * jump : Rgb<double>{};
   if (draw.roulette) sink.traced(scattered, rays, amount);

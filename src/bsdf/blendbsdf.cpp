@@ -1,15 +1,16 @@
 // A mixture of two BSDFs: 1 - weight of the first, weight of the second.
 #include <fmt/format.h>
 
+#include "src/bsdf/both_scalars.h"
 #include "src/bsdf/nested.h"
 
 namespace limn {
 namespace {
 
-class Blend final : public NestingBsdf {
+class Blend final : public BothScalars<Blend, NestingBsdf> {
  public:
   Blend(std::vector<std::shared_ptr<Bsdf>> nested, const ConstantOrTexture& weight)
-      : NestingBsdf(std::move(nested)), weight_(number("weight", weight)) {
+      : BothScalars(std::move(nested)), weight_(number("weight", weight)) {
     add_nested(false);
   }
 
@@ -19,11 +20,37 @@ class Blend final : public NestingBsdf {
     add_nested_parameters(list);
     return list;
   }
-  std::shared_ptr<Bsdf> clone() const override { return std::make_shared<Blend>(*this); }
   std::string describe() const override {
     const auto both = const_cast<Blend*>(this)->nested();  // NOLINT
     return fmt::format("blendbsdf, weight {} ({}; {})", text_of(weight_), both[0]->describe(),
                        both[1]->describe());
+  }
+
+  template <class S>
+  Rgb<S> evaluate(bool front, const Vec3<S>& n, const Vec3<S>& wi, const Vec3<S>& wo,
+                  const Rgb<S>* at) const {
+    Rgb<S> f;
+    for (size_t i = 0; i < 2; ++i) {
+      const Bsdf* const bsdf = side_of(i, front);
+      if (bsdf) f += bsdf->eval(n, wi, wo, at_of(i, at)) * weight(i, at);
+    }
+    return f;
+  }
+  template <class S>
+  int rays(bool front, const Vec3<S>& n, const Vec3<S>& wi, SmoothRays<S>& rays,
+           const Rgb<S>* at) const {
+    int count = 0;
+    for (size_t i = 0; i < 2; ++i) {
+      const Bsdf* const bsdf = side_of(i, front);
+      SmoothRays<S> of;
+      const int more = bsdf ? bsdf->smooth_rays(n, wi, of, at_of(i, at)) : 0;
+      for (int k = 0; k < more; ++k) {
+        rays[count] = of[k];
+        rays[count].weight = of[k].weight * weight(i, at);
+        ++count;
+      }
+    }
+    return count;
   }
 
  private:
@@ -51,14 +78,6 @@ class Blend final : public NestingBsdf {
     return sum > 0 ? std::clamp(albedo[1] / sum, 0.05, 0.95) : 0.5;
   }
 
-  Rgb<double> eval_from(bool front, const Vec3<double>& n, const Vec3<double>& wi,
-                        const Vec3<double>& wo, const Rgb<double>* at) const override {
-    return evaluate(front, n, wi, wo, at);
-  }
-  Rgb<Dual> eval_from(bool front, const Vec3<Dual>& n, const Vec3<Dual>& wi, const Vec3<Dual>& wo,
-                      const Rgb<Dual>* at) const override {
-    return evaluate(front, n, wi, wo, at);
-  }
   double pdf_from(bool front, const Vec3d& n, const Vec3d& wi, const Vec3d& wo,
                   const Rgb<double>* at) const override {
     const double share = second_share(front, at);
@@ -76,14 +95,6 @@ class Blend final : public NestingBsdf {
     const double rest = i ? u1 / share : (u1 - share) / (1 - share);
     const Bsdf* const bsdf = side_of(i, front);
     return bsdf ? bsdf->sample(n, wi, rest, u2, at_of(i, at)) : std::nullopt;
-  }
-  int smooth_from(bool front, const Vec3<double>& n, const Vec3<double>& wi,
-                  SmoothRays<double>& rays, const Rgb<double>* at) const override {
-    return join(front, n, wi, rays, at);
-  }
-  int smooth_from(bool front, const Vec3<Dual>& n, const Vec3<Dual>& wi, SmoothRays<Dual>& rays,
-                  const Rgb<Dual>* at) const override {
-    return join(front, n, wi, rays, at);
   }
   double eta_from(bool front, const Rgb<double>* at) const override {
     for (size_t i = 0; i < 2; ++i) {
@@ -114,33 +125,6 @@ class Blend final : public NestingBsdf {
       all = all.lobe.albedo == 0 ? of : PassedLobe{-n, {kHemisphere, 1, 1}};
     }
     return all;
-  }
-
-  template <class S>
-  Rgb<S> evaluate(bool front, const Vec3<S>& n, const Vec3<S>& wi, const Vec3<S>& wo,
-                  const Rgb<S>* at) const {
-    Rgb<S> f;
-    for (size_t i = 0; i < 2; ++i) {
-      const Bsdf* const bsdf = side_of(i, front);
-      if (bsdf) f += bsdf->eval(n, wi, wo, at_of(i, at)) * weight(i, at);
-    }
-    return f;
-  }
-  template <class S>
-  int join(bool front, const Vec3<S>& n, const Vec3<S>& wi, SmoothRays<S>& rays,
-           const Rgb<S>* at) const {
-    int count = 0;
-    for (size_t i = 0; i < 2; ++i) {
-      const Bsdf* const bsdf = side_of(i, front);
-      SmoothRays<S> of;
-      const int more = bsdf ? bsdf->smooth_rays(n, wi, of, at_of(i, at)) : 0;
-      for (int k = 0; k < more; ++k) {
-        rays[count] = of[k];
-        rays[count].weight = of[k].weight * weight(i, at);
-        ++count;
-      }
-    }
-    return count;
   }
 
   BsdfNumber weight_;

@@ -1,16 +1,16 @@
 // A smooth conductor: a mirror.
 #include <fmt/format.h>
 
+#include "src/bsdf/both_scalars.h"
 #include "src/bsdf/fresnel.h"
 #include "src/bsdf/indices.h"
 #include "src/bsdf/microfacet.h"
-#include "src/bsdf/sides.h"
 #include "src/bsdf/types.h"
 
 namespace limn {
 namespace {
 
-class Conductor final : public SidedBsdf {
+class Conductor final : public BothScalars<Conductor> {
  public:
   Conductor(const ConductorIndices& indices, const ConstantOrTexture& specular_reflectance)
       : eta_(colour("eta", indices.eta)),
@@ -31,24 +31,13 @@ class Conductor final : public SidedBsdf {
     add_parameter("specular_reflectance", specular_reflectance_, 0, 1, list);
     return list;
   }
-  std::shared_ptr<Bsdf> clone() const override { return std::make_shared<Conductor>(*this); }
   std::string describe() const override {
     return fmt::format("conductor, eta {}, k {}, specular_reflectance {}", text_of(eta_),
                        text_of(k_), text_of(specular_reflectance_));
   }
 
- private:
-  int smooth_from(bool, const Vec3<double>& n, const Vec3<double>& wi, SmoothRays<double>& rays,
-                  const Rgb<double>* at) const override {
-    return mirror(n, wi, rays, at);
-  }
-  int smooth_from(bool, const Vec3<Dual>& n, const Vec3<Dual>& wi, SmoothRays<Dual>& rays,
-                  const Rgb<Dual>* at) const override {
-    return mirror(n, wi, rays, at);
-  }
-
   template <class S>
-  int mirror(const Vec3<S>& n, const Vec3<S>& wi, SmoothRays<S>& rays, const Rgb<S>* at) const {
+  int rays(const Vec3<S>& n, const Vec3<S>& wi, SmoothRays<S>& rays, const Rgb<S>* at) const {
     const S cos_i = dot(n, wi);
     const Rgb<S> eta = eta_.of(at), k = k_.of(at);
     Rgb<S> f;
@@ -57,6 +46,7 @@ class Conductor final : public SidedBsdf {
     return 1;
   }
 
+ private:
   BsdfColour eta_, k_, specular_reflectance_;
 };
 

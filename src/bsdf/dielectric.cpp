@@ -4,14 +4,13 @@
 namespace limn {
 namespace {
 
-class Dielectric final : public SmoothBorder<Dielectric> {
+class Dielectric final : public BothScalars<Dielectric, SmoothBorder> {
  public:
-  static constexpr const char* kName = "dielectric";
-  using SmoothBorder::SmoothBorder;
+  using BothScalars::BothScalars;
 
   template <class S>
-  int split(bool front, const Vec3<S>& n, const Vec3<S>& wi, SmoothRays<S>& rays,
-            const Rgb<S>* at) const {
+  int rays(bool front, const Vec3<S>& n, const Vec3<S>& wi, SmoothRays<S>& rays,
+           const Rgb<S>* at) const {
     const S eta = front ? as<S>(eta_) : 1.0 / as<S>(eta_);
     const Fresnel<S> f = fresnel_dielectric<S>(dot(n, wi), eta);
     rays[0] = {reflected(wi, n), specular_reflectance_.of(at) * f.reflected};
@@ -35,7 +34,7 @@ std::shared_ptr<Bsdf> read_dielectric(Properties& properties) {
                                  eta, read_reflectance(properties, "specular_reflectance", 1),
                                  read_reflectance(properties, "specular_transmittance", 1)});
   }
-  return read_smooth_border<Dielectric>(properties, eta);
+  return read_smooth_border<Dielectric>("dielectric", properties, eta);
 }
 
 }  // namespace limn

@@ -2,25 +2,18 @@
 #include <algorithm>
 #include <limits>
 
+#include "src/bsdf/both_scalars.h"
 #include "src/bsdf/cosine.h"
 #include "src/bsdf/types.h"
 
 namespace limn {
 namespace {
 
-class Diffuse final : public Bsdf {
+class Diffuse final : public BothScalars<Diffuse, Bsdf> {
  public:
   explicit Diffuse(const ConstantOrTexture& reflectance)
       : reflectance_(colour("reflectance", reflectance)) {}
 
-  Rgb<double> eval(const Vec3<double>& n, const Vec3<double>& wi, const Vec3<double>& wo,
-                   const Rgb<double>* at) const override {
-    return evaluate(n, wi, wo, at);
-  }
-  Rgb<Dual> eval(const Vec3<Dual>& n, const Vec3<Dual>& wi, const Vec3<Dual>& wo,
-                 const Rgb<Dual>* at) const override {
-    return evaluate(n, wi, wo, at);
-  }
   double pdf_solid_angle(const Vec3d& n, const Vec3d& wi, const Vec3d& wo,
                          const Rgb<double>* /*at*/) const override {
     return dot(n, wi) > 0 ? std::fmax(0.0, dot(n, wo)) / kPi : 0;
@@ -43,10 +36,8 @@ class Diffuse final : public Bsdf {
     add_parameter("reflectance", reflectance_, 0, 1, list);
     return list;
   }
-  std::shared_ptr<Bsdf> clone() const override { return std::make_shared<Diffuse>(*this); }
   std::string describe() const override { return "diffuse, reflectance " + text_of(reflectance_); }
 
- private:
   template <class S>
   Rgb<S> evaluate(const Vec3<S>& n, const Vec3<S>& wi, const Vec3<S>& wo, const Rgb<S>* at) const {
     const S cos_o = dot(n, wo);
@@ -54,6 +45,7 @@ class Diffuse final : public Bsdf {
     return reflectance_.of(at) * (cos_o * (1 / kPi));
   }
 
+ private:
   BsdfColour reflectance_;
 };
 

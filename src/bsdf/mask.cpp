@@ -1,14 +1,15 @@
 // A surface that lets some of the light pass straight on: opacity times another BSDF. With opacity
 // 0 it is not seen at all (`null`), but ends shadow rays, as in Mitsuba's path tracer.
+#include "src/bsdf/both_scalars.h"
 #include "src/bsdf/nested.h"
 
 namespace limn {
 namespace {
 
-class Mask final : public NestingBsdf {
+class Mask final : public BothScalars<Mask, NestingBsdf> {
  public:
   Mask(std::vector<std::shared_ptr<Bsdf>> nested, const ConstantOrTexture& opacity)
-      : NestingBsdf(std::move(nested)), opacity_(number("opacity", opacity)) {
+      : BothScalars(std::move(nested)), opacity_(number("opacity", opacity)) {
     add_nested(true);
   }
 
@@ -18,9 +19,26 @@ class Mask final : public NestingBsdf {
     add_nested_parameters(list);
     return list;
   }
-  std::shared_ptr<Bsdf> clone() const override { return std::make_shared<Mask>(*this); }
   std::string describe() const override {
     return "mask, opacity " + text_of(opacity_) + " (" + inside().describe() + ")";
+  }
+
+  template <class S>
+  Rgb<S> evaluate(bool front, const Vec3<S>& n, const Vec3<S>& wi, const Vec3<S>& wo,
+                  const Rgb<S>* at) const {
+    const Bsdf* const bsdf = side_of(0, front);
+    return bsdf ? bsdf->eval(n, wi, wo, at_of(0, at)) * opacity(at) : Rgb<S>{};
+  }
+  // What is nested, then straight on.
+  template <class S>
+  int rays(bool front, const Vec3<S>& n, const Vec3<S>& wi, SmoothRays<S>& rays,
+           const Rgb<S>* at) const {
+    const Bsdf* const bsdf = side_of(0, front);
+    const int count = bsdf ? bsdf->smooth_rays(n, wi, rays, at_of(0, at)) : 0;
+    const S o = opacity(at);
+    for (int k = 0; k < count; ++k) rays[k].weight = rays[k].weight * o;
+    rays[count] = {-wi, grey(S(1.0 - o))};
+    return count + 1;
   }
 
  private:
@@ -31,14 +49,6 @@ class Mask final : public NestingBsdf {
     return within_unit(opacity_.of(at));
   }
 
-  Rgb<double> eval_from(bool front, const Vec3<double>& n, const Vec3<double>& wi,
-                        const Vec3<double>& wo, const Rgb<double>* at) const override {
-    return evaluate(front, n, wi, wo, at);
-  }
-  Rgb<Dual> eval_from(bool front, const Vec3<Dual>& n, const Vec3<Dual>& wi, const Vec3<Dual>& wo,
-                      const Rgb<Dual>* at) const override {
-    return evaluate(front, n, wi, wo, at);
-  }
   double pdf_from(bool front, const Vec3d& n, const Vec3d& wi, const Vec3d& wo,
                   const Rgb<double>* at) const override {
     const Bsdf* const bsdf = side_of(0, front);
@@ -48,14 +58,6 @@ class Mask final : public NestingBsdf {
                                    double u2, const Rgb<double>* at) const override {
     const Bsdf* const bsdf = side_of(0, front);
     return bsdf ? bsdf->sample(n, wi, u1, u2, at_of(0, at)) : std::nullopt;
-  }
-  int smooth_from(bool front, const Vec3<double>& n, const Vec3<double>& wi,
-                  SmoothRays<double>& rays, const Rgb<double>* at) const override {
-    return pass(front, n, wi, rays, at);
-  }
-  int smooth_from(bool front, const Vec3<Dual>& n, const Vec3<Dual>& wi, SmoothRays<Dual>& rays,
-                  const Rgb<Dual>* at) const override {
-    return pass(front, n, wi, rays, at);
   }
   double eta_from(bool front, const Rgb<double>* at) const override {
     const Bsdf* const bsdf = side_of(0, front);
@@ -72,24 +74,6 @@ class Mask final : public NestingBsdf {
     PassedLobe passed = side_of(0, front)->passed_lobe(n, wi, at_of(0, at));
     if (at || opacity_.texture < 0) passed.lobe.albedo *= opacity(at);
     return passed;
-  }
-
-  template <class S>
-  Rgb<S> evaluate(bool front, const Vec3<S>& n, const Vec3<S>& wi, const Vec3<S>& wo,
-                  const Rgb<S>* at) const {
-    const Bsdf* const bsdf = side_of(0, front);
-    return bsdf ? bsdf->eval(n, wi, wo, at_of(0, at)) * opacity(at) : Rgb<S>{};
-  }
-  // What is nested, then straight on.
-  template <class S>
-  int pass(bool front, const Vec3<S>& n, const Vec3<S>& wi, SmoothRays<S>& rays,
-           const Rgb<S>* at) const {
-    const Bsdf* const bsdf = side_of(0, front);
-    const int count = bsdf ? bsdf->smooth_rays(n, wi, rays, at_of(0, at)) : 0;
-    const S o = opacity(at);
-    for (int k = 0; k < count; ++k) rays[k].weight = rays[k].weight * o;
-    rays[count] = {-wi, grey(S(1.0 - o))};
-    return count + 1;
   }
 
   BsdfNumber opacity_;

@@ -4,16 +4,16 @@
 // with 1 - R for 1 - rho R unless `nonlinear`, and the coat a smooth lobe of weight ks F(cos_i).
 #include <fmt/format.h>
 
+#include "src/bsdf/both_scalars.h"
 #include "src/bsdf/cosine.h"
 #include "src/bsdf/fresnel.h"
 #include "src/bsdf/indices.h"
-#include "src/bsdf/sides.h"
 #include "src/bsdf/types.h"
 
 namespace limn {
 namespace {
 
-class Plastic final : public SidedBsdf {
+class Plastic final : public BothScalars<Plastic> {
  public:
   Plastic(double eta, bool nonlinear, const ConstantOrTexture& diffuse,
           const ConstantOrTexture& specular)
@@ -35,22 +35,31 @@ class Plastic final : public SidedBsdf {
     add_parameter("specular_reflectance", specular_, 0, 1, list);
     return list;
   }
-  std::shared_ptr<Bsdf> clone() const override { return std::make_shared<Plastic>(*this); }
   std::string describe() const override {
     return fmt::format("plastic, eta {:g}, {}diffuse_reflectance {}, specular_reflectance {}",
                        eta_.v, nonlinear_ ? "nonlinear, " : "", text_of(diffuse_),
                        text_of(specular_));
   }
 
+  template <class S>
+  Rgb<S> evaluate(const Vec3<S>& n, const Vec3<S>& wi, const Vec3<S>& wo, const Rgb<S>* at) const {
+    const S cos_i = dot(n, wi), cos_o = dot(n, wo);
+    if (!(value(cos_i) > 0 && value(cos_o) > 0)) return {};
+    const S eta = as<S>(eta_);
+    const S passes = (1.0 - fresnel_dielectric(cos_i, eta).reflected) *
+                     (1.0 - fresnel_dielectric(cos_o, eta).reflected);
+    const Rgb<S> rho = diffuse_.of(at);
+    return Rgb<S>{factor(rho.r, eta), factor(rho.g, eta), factor(rho.b, eta)} *
+           (passes * cos_o * (1 / kPi));
+  }
+  template <class S>
+  int rays(const Vec3<S>& n, const Vec3<S>& wi, SmoothRays<S>& rays, const Rgb<S>* at) const {
+    const S f = fresnel_dielectric<S>(dot(n, wi), as<S>(eta_)).reflected;
+    rays[0] = {reflected(wi, n), specular_.of(at) * f};
+    return 1;
+  }
+
  private:
-  Rgb<double> eval_from(bool, const Vec3<double>& n, const Vec3<double>& wi, const Vec3<double>& wo,
-                        const Rgb<double>* at) const override {
-    return base(n, wi, wo, at);
-  }
-  Rgb<Dual> eval_from(bool, const Vec3<Dual>& n, const Vec3<Dual>& wi, const Vec3<Dual>& wo,
-                      const Rgb<Dual>* at) const override {
-    return base(n, wi, wo, at);
-  }
   double pdf_from(bool, const Vec3d& n, const Vec3d& wi, const Vec3d& wo,
                   const Rgb<double>*) const override {
     return dot(n, wi) > 0 ? std::fmax(0.0, dot(n, wo)) / kPi : 0;
@@ -59,14 +68,6 @@ class Plastic final : public SidedBsdf {
                                    const Rgb<double>*) const override {
     if (!(dot(n, wi) > 0)) return std::nullopt;
     return sample_cosine(n, u1, u2);
-  }
-  int smooth_from(bool, const Vec3<double>& n, const Vec3<double>& wi, SmoothRays<double>& rays,
-                  const Rgb<double>* at) const override {
-    return coat(n, wi, rays, at);
-  }
-  int smooth_from(bool, const Vec3<Dual>& n, const Vec3<Dual>& wi, SmoothRays<Dual>& rays,
-                  const Rgb<Dual>* at) const override {
-    return coat(n, wi, rays, at);
   }
   // F is least at normal incidence.
   LobeSummary lobe_from(bool, const Rgb<double>* at) const override {
@@ -80,23 +81,6 @@ class Plastic final : public SidedBsdf {
   S factor(const S& rho, const S& eta) const {
     const S inner = inner_diffuse_reflectance(eta);
     return rho / ((1.0 - (nonlinear_ ? rho * inner : inner)) * (eta * eta));
-  }
-  template <class S>
-  Rgb<S> base(const Vec3<S>& n, const Vec3<S>& wi, const Vec3<S>& wo, const Rgb<S>* at) const {
-    const S cos_i = dot(n, wi), cos_o = dot(n, wo);
-    if (!(value(cos_i) > 0 && value(cos_o) > 0)) return {};
-    const S eta = as<S>(eta_);
-    const S passes = (1.0 - fresnel_dielectric(cos_i, eta).reflected) *
-                     (1.0 - fresnel_dielectric(cos_o, eta).reflected);
-    const Rgb<S> rho = diffuse_.of(at);
-    return Rgb<S>{factor(rho.r, eta), factor(rho.g, eta), factor(rho.b, eta)} *
-           (passes * cos_o * (1 / kPi));
-  }
-  template <class S>
-  int coat(const Vec3<S>& n, const Vec3<S>& wi, SmoothRays<S>& rays, const Rgb<S>* at) const {
-    const S f = fresnel_dielectric<S>(dot(n, wi), as<S>(eta_)).reflected;
-    rays[0] = {reflected(wi, n), specular_.of(at) * f};
-    return 1;
   }
 
   Dual eta_;  // the index of refraction inside over that outside, at least 1

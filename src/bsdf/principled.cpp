@@ -4,12 +4,12 @@
 
 #include <algorithm>
 
+#include "src/bsdf/both_scalars.h"
 #include "src/bsdf/cosine.h"
 #include "src/bsdf/fresnel.h"
 #include "src/bsdf/indices.h"
 #include "src/bsdf/microfacet_reflection.h"
 #include "src/bsdf/principled_parts.h"
-#include "src/bsdf/sides.h"
 #include "src/bsdf/types.h"
 
 namespace limn {
@@ -47,7 +47,7 @@ S gtr1(const S& cos2, const S& sin2, const S& alpha) {
   return (a2 - 1.0) / (kPi * log_of(a2) * (a2 * cos2 + sin2));
 }
 
-class Principled final : public SidedBsdf {
+class Principled final : public BothScalars<Principled> {
  public:
   explicit Principled(Properties& properties);
 
@@ -57,18 +57,13 @@ class Principled final : public SidedBsdf {
     return constant;
   }
   std::vector<ParameterRef> parameters() override;
-  std::shared_ptr<Bsdf> clone() const override { return std::make_shared<Principled>(*this); }
   std::string describe() const override;
 
+  template <class S>
+  Rgb<S> evaluate(bool front, const Vec3<S>& n, const Vec3<S>& wi, const Vec3<S>& wo,
+                  const Rgb<S>* at) const;
+
  private:
-  Rgb<double> eval_from(bool front, const Vec3<double>& n, const Vec3<double>& wi,
-                        const Vec3<double>& wo, const Rgb<double>* at) const override {
-    return evaluate(front, n, wi, wo, at);
-  }
-  Rgb<Dual> eval_from(bool front, const Vec3<Dual>& n, const Vec3<Dual>& wi, const Vec3<Dual>& wo,
-                      const Rgb<Dual>* at) const override {
-    return evaluate(front, n, wi, wo, at);
-  }
   double pdf_from(bool front, const Vec3d& n, const Vec3d& wi, const Vec3d& wo,
                   const Rgb<double>* at) const override;
   std::optional<Vec3d> sample_from(bool front, const Vec3d& n, const Vec3d& wi, double u1,
@@ -102,9 +97,6 @@ class Principled final : public SidedBsdf {
   S clearcoat_alpha(const Rgb<S>* at) const {
     return 0.1 - 0.099 * of(kClearcoatGloss, at);
   }
-  template <class S>
-  Rgb<S> evaluate(bool front, const Vec3<S>& n, const Vec3<S>& wi, const Vec3<S>& wo,
-                  const Rgb<S>* at) const;
   template <class S>
   Rgb<S> passed(bool front, const Vec3<S>& n, const Vec3<S>& wi, const Vec3<S>& wo,
                 const Rgb<S>* at) const;

@@ -4,12 +4,12 @@
 
 #include <algorithm>
 
+#include "src/bsdf/both_scalars.h"
 #include "src/bsdf/cosine.h"
 #include "src/bsdf/fresnel.h"
 #include "src/bsdf/indices.h"
 #include "src/bsdf/microfacet_reflection.h"
 #include "src/bsdf/principled_parts.h"
-#include "src/bsdf/sides.h"
 #include "src/bsdf/types.h"
 
 namespace limn {
@@ -40,7 +40,7 @@ constexpr NumberType kTypes[kNumbers] = {
     {"spec_tint", 0, 0, 1},   {"sheen", 0, 0, 1},       {"sheen_tint", 0, 0, 1},
     {"flatness", 0, 0, 1},    {"diff_trans", 0, 0, 2},  {"eta", 1.5, kLeastIor, kMostIor}};
 
-class PrincipledThin final : public SidedBsdf {
+class PrincipledThin final : public BothScalars<PrincipledThin> {
  public:
   explicit PrincipledThin(Properties& properties);
 
@@ -50,18 +50,12 @@ class PrincipledThin final : public SidedBsdf {
     return constant;
   }
   std::vector<ParameterRef> parameters() override;
-  std::shared_ptr<Bsdf> clone() const override { return std::make_shared<PrincipledThin>(*this); }
   std::string describe() const override;
 
+  template <class S>
+  Rgb<S> evaluate(const Vec3<S>& n, const Vec3<S>& wi, const Vec3<S>& wo, const Rgb<S>* at) const;
+
  private:
-  Rgb<double> eval_from(bool, const Vec3<double>& n, const Vec3<double>& wi, const Vec3<double>& wo,
-                        const Rgb<double>* at) const override {
-    return evaluate(n, wi, wo, at);
-  }
-  Rgb<Dual> eval_from(bool, const Vec3<Dual>& n, const Vec3<Dual>& wi, const Vec3<Dual>& wo,
-                      const Rgb<Dual>* at) const override {
-    return evaluate(n, wi, wo, at);
-  }
   double pdf_from(bool, const Vec3d& n, const Vec3d& wi, const Vec3d& wo,
                   const Rgb<double>* at) const override;
   std::optional<Vec3d> sample_from(bool, const Vec3d& n, const Vec3d& wi, double u1, double u2,
@@ -102,8 +96,6 @@ class PrincipledThin final : public SidedBsdf {
     const S cos_o = dot(n, wo);
     return value(cos_o) < 0 ? wo - n * (2.0 * cos_o) : wo;
   }
-  template <class S>
-  Rgb<S> evaluate(const Vec3<S>& n, const Vec3<S>& wi, const Vec3<S>& wo, const Rgb<S>* at) const;
   // Probabilities of drawing from the parts.
   struct Shares {
     double diffuse, diffuse_passed, glossy, glossy_passed;

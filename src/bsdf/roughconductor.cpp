@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "limn/core/names.h"
+#include "src/bsdf/both_scalars.h"
 #include "src/bsdf/indices.h"
 #include "src/bsdf/microfacet_reflection.h"
 #include "src/bsdf/types.h"
@@ -15,7 +16,7 @@ using microfacet::AnisotropicFacets, microfacet::Distribution, microfacet::Facet
 using microfacet::is_seen, microfacet::kMaximumAlpha, microfacet::kMinimumAlpha;
 using microfacet::Reflection;
 
-class RoughConductor final : public Bsdf {
+class RoughConductor final : public BothScalars<RoughConductor, Bsdf> {
  public:
   explicit RoughConductor(const RoughConductorValues& v)
       : distribution_(v.distribution),
@@ -26,14 +27,6 @@ class RoughConductor final : public Bsdf {
         k_(v.k),
         specular_reflectance_(colour("specular_reflectance", v.specular_reflectance)) {}
 
-  Rgb<double> eval(const Vec3<double>& n, const Vec3<double>& wi, const Vec3<double>& wo,
-                   const Rgb<double>* at) const override {
-    return evaluate(n, wi, wo, at);
-  }
-  Rgb<Dual> eval(const Vec3<Dual>& n, const Vec3<Dual>& wi, const Vec3<Dual>& wo,
-                 const Rgb<Dual>* at) const override {
-    return evaluate(n, wi, wo, at);
-  }
   double pdf_solid_angle(const Vec3d& n, const Vec3d& wi, const Vec3d& wo,
                          const Rgb<double>* at) const override {
     if (!is_seen(n, wi, wo)) return 0;
@@ -66,8 +59,16 @@ class RoughConductor final : public Bsdf {
     add_parameter("specular_reflectance", specular_reflectance_, 0, 1, list);
     return list;
   }
-  std::shared_ptr<Bsdf> clone() const override { return std::make_shared<RoughConductor>(*this); }
   std::string describe() const override;
+
+  template <class S>
+  Rgb<S> evaluate(const Vec3<S>& n, const Vec3<S>& wi, const Vec3<S>& wo, const Rgb<S>* at) const {
+    if (!is_seen(value(n), value(wi), value(wo))) return {};
+    return with_facets(n, at, [&](const auto& facets) {
+      const Reflection<S, std::decay_t<decltype(facets)>> r(facets, n, wi, wo);
+      return coloured(r.cos_h, r.value(), specular(at));
+    });
+  }
 
  private:
   bool is_ggx() const { return distribution_ == Distribution::kGgx; }
@@ -91,14 +92,6 @@ class RoughConductor final : public Bsdf {
     const Rgb<S> tangent = at ? at[tangent_] : Rgb<S>{};
     return f(AnisotropicFacets<S>(distribution_, alpha(alpha_, at), alpha(alpha_v_, at), n,
                                   Vec3<S>{tangent.r, tangent.g, tangent.b}));
-  }
-  template <class S>
-  Rgb<S> evaluate(const Vec3<S>& n, const Vec3<S>& wi, const Vec3<S>& wo, const Rgb<S>* at) const {
-    if (!is_seen(value(n), value(wi), value(wo))) return {};
-    return with_facets(n, at, [&](const auto& facets) {
-      const Reflection<S, std::decay_t<decltype(facets)>> r(facets, n, wi, wo);
-      return coloured(r.cos_h, r.value(), specular(at));
-    });
   }
   // Times Fresnel's factor. specular: S, or double for wide::Doubles.
   template <class S, class T>

@@ -8,10 +8,10 @@
 
 #include <algorithm>
 
+#include "src/bsdf/both_scalars.h"
 #include "src/bsdf/fresnel.h"
 #include "src/bsdf/indices.h"
 #include "src/bsdf/microfacet_reflection.h"
-#include "src/bsdf/sides.h"
 #include "src/bsdf/types.h"
 
 namespace limn {
@@ -47,7 +47,7 @@ struct Facet {
   }
 };
 
-class RoughDielectric final : public SidedBsdf {
+class RoughDielectric final : public BothScalars<RoughDielectric> {
  public:
   explicit RoughDielectric(const RoughDielectricValues& v)
       : distribution_(v.distribution),
@@ -72,7 +72,6 @@ class RoughDielectric final : public SidedBsdf {
     add_parameter("specular_transmittance", specular_transmittance_, 0, 1, list);
     return list;
   }
-  std::shared_ptr<Bsdf> clone() const override { return std::make_shared<RoughDielectric>(*this); }
   std::string describe() const override {
     return fmt::format(
         "roughdielectric, {}, alpha {}, eta {:g}, specular_reflectance {}, specular_transmittance "
@@ -80,6 +79,10 @@ class RoughDielectric final : public SidedBsdf {
         is_ggx() ? "ggx" : "beckmann", text_of(alpha_), eta_.v, text_of(specular_reflectance_),
         text_of(specular_transmittance_));
   }
+
+  template <class S>
+  Rgb<S> evaluate(bool front, const Vec3<S>& n, const Vec3<S>& wi, const Vec3<S>& wo,
+                  const Rgb<S>* at) const;
 
  private:
   bool is_ggx() const { return distribution_ == Distribution::kGgx; }
@@ -98,14 +101,6 @@ class RoughDielectric final : public SidedBsdf {
   }
   FacetSide facet_side(bool front, double cos_h, const Rgb<double>* at) const;
 
-  Rgb<double> eval_from(bool front, const Vec3<double>& n, const Vec3<double>& wi,
-                        const Vec3<double>& wo, const Rgb<double>* at) const override {
-    return evaluate(front, n, wi, wo, at);
-  }
-  Rgb<Dual> eval_from(bool front, const Vec3<Dual>& n, const Vec3<Dual>& wi, const Vec3<Dual>& wo,
-                      const Rgb<Dual>* at) const override {
-    return evaluate(front, n, wi, wo, at);
-  }
   double pdf_from(bool front, const Vec3d& n, const Vec3d& wi, const Vec3d& wo,
                   const Rgb<double>* at) const override;
   std::optional<Vec3d> sample_from(bool front, const Vec3d& n, const Vec3d& wi, double u1,
@@ -119,9 +114,6 @@ class RoughDielectric final : public SidedBsdf {
   }
   PassedLobe passed_lobe_from(bool front, const Vec3d& n, const Vec3d& wi,
                               const Rgb<double>* at) const override;
-  template <class S>
-  Rgb<S> evaluate(bool front, const Vec3<S>& n, const Vec3<S>& wi, const Vec3<S>& wo,
-                  const Rgb<S>* at) const;
 
   Distribution distribution_;
   BsdfNumber alpha_;

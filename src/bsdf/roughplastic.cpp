@@ -6,6 +6,7 @@
 
 #include <algorithm>
 
+#include "src/bsdf/both_scalars.h"
 #include "src/bsdf/cosine.h"
 #include "src/bsdf/fresnel.h"
 #include "src/bsdf/indices.h"
@@ -18,7 +19,7 @@ namespace {
 using microfacet::Facets, microfacet::Reflection;
 using microfacet::is_seen, microfacet::kMaximumAlpha, microfacet::kMinimumAlpha;
 
-class RoughPlastic final : public Bsdf {
+class RoughPlastic final : public BothScalars<RoughPlastic, Bsdf> {
  public:
   explicit RoughPlastic(const RoughPlasticValues& v)
       : distribution_(v.distribution),
@@ -29,14 +30,6 @@ class RoughPlastic final : public Bsdf {
         specular_(colour("specular_reflectance", v.specular_reflectance)),
         boundary_(v.distribution, alpha<double>(), v.eta) {}
 
-  Rgb<double> eval(const Vec3<double>& n, const Vec3<double>& wi, const Vec3<double>& wo,
-                   const Rgb<double>* at) const override {
-    return evaluate(n, wi, wo, at);
-  }
-  Rgb<Dual> eval(const Vec3<Dual>& n, const Vec3<Dual>& wi, const Vec3<Dual>& wo,
-                 const Rgb<Dual>* at) const override {
-    return evaluate(n, wi, wo, at);
-  }
   double pdf_solid_angle(const Vec3d& n, const Vec3d& wi, const Vec3d& wo,
                          const Rgb<double>* at) const override {
     if (!is_seen(n, wi, wo)) return 0;
@@ -59,8 +52,14 @@ class RoughPlastic final : public Bsdf {
   }
   LobeSummary lobe(const Rgb<double>* at) const override;
   std::vector<ParameterRef> parameters() override;
-  std::shared_ptr<Bsdf> clone() const override { return std::make_shared<RoughPlastic>(*this); }
   std::string describe() const override;
+
+  template <class S>
+  Rgb<S> evaluate(const Vec3<S>& n, const Vec3<S>& wi, const Vec3<S>& wo, const Rgb<S>* at) const {
+    if (!is_seen(value(n), value(wi), value(wo))) return {};
+    const Facets<S> f = facets<S>();
+    return both(Reflection<S>(f, n, wi, wo), at);
+  }
 
  private:
   template <class S>
@@ -70,12 +69,6 @@ class RoughPlastic final : public Bsdf {
   template <class S>
   Facets<S> facets() const {
     return {distribution_, alpha<S>()};
-  }
-  template <class S>
-  Rgb<S> evaluate(const Vec3<S>& n, const Vec3<S>& wi, const Vec3<S>& wo, const Rgb<S>* at) const {
-    if (!is_seen(value(n), value(wi), value(wo))) return {};
-    const Facets<S> f = facets<S>();
-    return both(Reflection<S>(f, n, wi, wo), at);
   }
   // The two parts.
   template <class S>

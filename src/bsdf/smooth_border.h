@@ -7,21 +7,20 @@
 #include <string>
 #include <vector>
 
+#include "src/bsdf/both_scalars.h"
 #include "src/bsdf/fresnel.h"
 #include "src/bsdf/indices.h"
-#include "src/bsdf/sides.h"
 #include "src/bsdf/types.h"
 
 namespace limn {
 
-// Border: derives from this and has kName and split(front, n, wi, rays, at), which is smooth_rays
-// of that side and writes two.
-template <class Border>
+// What derives from it, by way of BothScalars, has rays(front, n, wi, rays, at), which writes two.
 class SmoothBorder : public SidedBsdf {
  public:
-  SmoothBorder(double eta, const ConstantOrTexture& reflectance,
+  SmoothBorder(const char* name, double eta, const ConstantOrTexture& reflectance,
                const ConstantOrTexture& transmittance)
-      : eta_(eta),
+      : name_(name),
+        eta_(eta),
         specular_reflectance_(colour("specular_reflectance", reflectance)),
         specular_transmittance_(colour("specular_transmittance", transmittance)) {
     lobes_ = {.above = false, .smooth = true, .through = true};
@@ -39,34 +38,22 @@ class SmoothBorder : public SidedBsdf {
     add_parameter("specular_transmittance", specular_transmittance_, 0, 1, list);
     return list;
   }
-  std::shared_ptr<Bsdf> clone() const final { return std::make_shared<Border>(border()); }
   std::string describe() const final {
-    return fmt::format("{}, eta {:g}, specular_reflectance {}, specular_transmittance {}",
-                       Border::kName, eta_.v, text_of(specular_reflectance_),
-                       text_of(specular_transmittance_));
+    return fmt::format("{}, eta {:g}, specular_reflectance {}, specular_transmittance {}", name_,
+                       eta_.v, text_of(specular_reflectance_), text_of(specular_transmittance_));
   }
 
  protected:
+  const char* name_;
   Dual eta_;  // the index of refraction inside over that outside
   BsdfColour specular_reflectance_, specular_transmittance_;
-
- private:
-  const Border& border() const { return static_cast<const Border&>(*this); }
-  int smooth_from(bool front, const Vec3<double>& n, const Vec3<double>& wi,
-                  SmoothRays<double>& rays, const Rgb<double>* at) const final {
-    return border().split(front, n, wi, rays, at);
-  }
-  int smooth_from(bool front, const Vec3<Dual>& n, const Vec3<Dual>& wi, SmoothRays<Dual>& rays,
-                  const Rgb<Dual>* at) const final {
-    return border().split(front, n, wi, rays, at);
-  }
 };
 
 // eta: what the element says of it.
 template <class Border>
-std::shared_ptr<Bsdf> read_smooth_border(Properties& properties, double eta) {
+std::shared_ptr<Bsdf> read_smooth_border(const char* name, Properties& properties, double eta) {
   const ConstantOrTexture reflectance = read_reflectance(properties, "specular_reflectance", 1);
-  return std::make_shared<Border>(eta, reflectance,
+  return std::make_shared<Border>(name, eta, reflectance,
                                   read_reflectance(properties, "specular_transmittance", 1));
 }
 

@@ -5,15 +5,14 @@
 namespace limn {
 namespace {
 
-class ThinDielectric final : public SmoothBorder<ThinDielectric> {
+class ThinDielectric final : public BothScalars<ThinDielectric, SmoothBorder> {
  public:
-  static constexpr const char* kName = "thindielectric";
-  using SmoothBorder::SmoothBorder;
+  using BothScalars::BothScalars;
 
   // One face reflects r; with t = 1 - r, both r + t^2 r (1 + r^2 + r^4 + ...) = 2 r / (1 + r).
   template <class S>
-  int split(bool /*front*/, const Vec3<S>& n, const Vec3<S>& wi, SmoothRays<S>& rays,
-            const Rgb<S>* at) const {
+  int rays(bool /*front*/, const Vec3<S>& n, const Vec3<S>& wi, SmoothRays<S>& rays,
+           const Rgb<S>* at) const {
     const S r = fresnel_dielectric<S>(dot(n, wi), as<S>(eta_)).reflected;
     const S all = 2.0 * r / (1.0 + r);
     rays[0] = {reflected(wi, n), specular_reflectance_.of(at) * all};
@@ -25,7 +24,8 @@ class ThinDielectric final : public SmoothBorder<ThinDielectric> {
 }  // namespace
 
 std::shared_ptr<Bsdf> read_thindielectric(Properties& properties) {
-  return read_smooth_border<ThinDielectric>(properties, read_relative_ior(properties, "bk7"));
+  return read_smooth_border<ThinDielectric>("thindielectric", properties,
+                                            read_relative_ior(properties, "bk7"));
 }
 
 }  // namespace limn

@@ -256,11 +256,15 @@ void for_textures(const Bsdf& bsdf, const TexturesAt<Var>& textures, Rgb<Dual>* 
   end_at(textures.count());
 }
 
+struct Directions {
+  const Vec3<Var>&n, &wi, &wo;
+};
+
 // Calls eval(bsdf, n, wi, wo, at) with each argument in turn moving, and add(nodes, what it gives).
 template <class Eval, class Add>
-void along_each(const Bsdf& bsdf, const SeededCopies<Bsdf>* copies, const Vec3<Var>& n,
-                const Vec3<Var>& wi, const Vec3<Var>& wo, const TexturesAt<Var>& textures,
-                const Eval& eval, const Add& add) {
+void along_each(const Bsdf& bsdf, const SeededCopies<Bsdf>* copies, const Directions& directions,
+                const TexturesAt<Var>& textures, const Eval& eval, const Add& add) {
+  const auto& [n, wi, wo] = directions;
   Rgb<Dual> at[kMostTextures];
   for (int k = 0; k < textures.count(); ++k) at[k] = held_colour(textures.held()[k]);
   if (!is_constant(n)) add(n, eval(bsdf, along_axes(n), held(wi), held(wo), at));
@@ -288,7 +292,7 @@ Rgb<Var> eval_bsdf<Var>(const Bsdf& bsdf, const SeededCopies<Bsdf>* copies, cons
   Jacobian jacobian;
   std::optional<Rgb<double>> f;
   along_each(
-      bsdf, copies, n, wi, wo, textures,
+      bsdf, copies, {n, wi, wo}, textures,
       [](const Bsdf& of, const auto&... arguments) { return of.eval(arguments...); },
       [&](const auto& nodes, const Rgb<Dual>& moving) {
         jacobian.add(nodes, moving);
@@ -305,7 +309,7 @@ SmoothRay<Var> smooth_ray<Var>(const Bsdf& bsdf, const SeededCopies<Bsdf>* copie
   bsdf.smooth_rays(value(n), value(wi), rays, textures.held());
   Jacobian direction, weight;
   along_each(
-      bsdf, copies, n, wi, {}, textures,
+      bsdf, copies, {n, wi, {}}, textures,
       [k](const Bsdf& of, const Vec3<Dual>& normal, const Vec3<Dual>& from, const Vec3<Dual>&,
           const Rgb<Dual>* at) {
         SmoothRays<Dual> moving;

@@ -50,7 +50,7 @@ TEST(FilmMotion, TakesBackWhatItAdds) {
     const auto terms = terms_of(scene, sampler, false, true);
     const Parameter parameter = find_parameter(scene, "ball.translate.y");
     TermEstimator estimator(scene, {&parameter, 1}, terms, std::vector<bool>(terms.size(), true),
-                            sampler, 2, nullptr, nullptr, false, true);
+                            sampler, 2, {.moved_film = true});
     SamplePlan plan;
     plan.grid = PlanGrid(scene.film, film_size(scene.film));
     FilmMotion motion;
@@ -281,7 +281,7 @@ TEST(FilmMotion, LeavesNothingBehind) {
   const auto images = [&](const std::vector<SamplePlan>& plans) {
     auto estimator = std::make_unique<TermEstimator>(scene, std::span(&parameter, 1), terms,
                                                      std::vector<bool>(terms.size(), true), sampler,
-                                                     1, nullptr, nullptr, false, true);
+                                                     1, TermExtras{.moved_film = true});
     for (const SamplePlan& plan : plans) estimator->set_plan(plan);
     std::vector<std::unique_ptr<SampleEstimator>> one;
     one.push_back(std::move(estimator));
