@@ -156,9 +156,9 @@ class ExactDirect {
     RayCount rays;
     Rgb<double> result;
     if (!view_edge(mesh, part.id, 0.5 * (part.t0 + part.t1), query.p, view)) return {};
-    const bool seen = edge_difference(context_, mesh, view, query.face, 0,
-                                      std::numeric_limits<double>::infinity(), 1, Rng(0, 0, 0),
-                                      rays, result, {&regions_, region});
+    const Rng key(0, 0, 0);
+    const EdgeViewer viewer{query.face, 1, key, {&regions_, region}};
+    const bool seen = edge_difference(context_, mesh, view, viewer, rays, result);
     return seen ? result : Rgb<double>{};
   }
 
