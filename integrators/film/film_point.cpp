@@ -24,11 +24,12 @@ std::optional<FilmPoint> film_point(const Scene& scene, FaceRef face, const Vec3
   return point;
 }
 
-CameraRay<Dual> shifted_ray(const Camera& camera, double x, double y) {
+CameraRay<Dual> shifted_ray(const Camera& camera, const FilmPlace& at) {
   const auto at_rest = [](const Vec3<Dual>& v) { return Vec3<Dual>{v.x.v, v.y.v, v.z.v}; };
   const CameraView<Dual> view(camera, at_rest(camera.origin), at_rest(camera.left),
-                              at_rest(camera.up), at_rest(camera.forward), Dual(camera.fov.v), {});
-  return view.ray(Dual(x, {1, 0, 0, 0}), Dual(y, {0, 1, 0, 0}));
+                              at_rest(camera.up), at_rest(camera.forward), Dual(camera.fov.v),
+                              {Dual(camera.aperture_radius.v), Dual(camera.focus_distance.v)});
+  return view.at(at.lens).ray(Dual(at.x, {1, 0, 0, 0}), Dual(at.y, {0, 1, 0, 0}));
 }
 
 Ray ray_to(const Scene& scene, const FilmPoint& point, FaceRef face) {

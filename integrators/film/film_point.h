@@ -27,9 +27,9 @@ inline FilmPoint aimed_at(FilmPoint point, const Vec3d& x) {
   point.omega = way / point.distance;
   return point;
 }
-// The ray of a camera without a lens through a film position, at rest but for that, which moves by
-// a pixel along x in lane 0, and along y in lane 1.
-CameraRay<Dual> shifted_ray(const Camera& camera, double x, double y);
+// The ray through a film position, at rest but for that, which moves by a pixel along x in lane 0,
+// and along y in lane 1.
+CameraRay<Dual> shifted_ray(const Camera& camera, const FilmPlace& at);
 // To the face, as shadow rays end.
 Ray ray_to(const Scene& scene, const FilmPoint& point, FaceRef face);
 // One shadow ray.

@@ -28,7 +28,7 @@ inline bool PathTracer<S, Visitor>::turns_smoothly(Walk& walk) const {
 }
 
 // Whether the edges that the smooth ray wo sees are in no term: the path has come otherwise than
-// straight on, by a chain of flat mirrors or, for a camera, through flat glass.
+// straight on, by a chain of flat mirrors or, from the camera, through flat glass.
 template <class S, class Visitor>
 inline bool PathTracer<S, Visitor>::hides_edges(Walk& walk, const Vec3d& wo) const {
   if (walk.step.pdf > 0) {
@@ -47,9 +47,8 @@ inline bool PathTracer<S, Visitor>::hides_edges(Walk& walk, const Vec3d& wo) con
   chain.mirrors[chain.count++] = mirror;
   chain.through = through;
   const Vec3d n = walk.scattering->front() ? walk.surface.n_g : -walk.surface.n_g;
-  // The camera sees them if it is a pinhole; vertices see nothing refracted.
-  const bool sees = walk.was_rough ? !through : c_.scene.camera.is_pinhole();
-  return !sees || (!through && !is_mirrored(n, value(walk.wi), wo)) || !mirrors->has(chain);
+  // The camera sees all of them, vertices see nothing refracted.
+  return (walk.was_rough && through) || (!through && !is_mirrored(n, value(walk.wi), wo)) || !mirrors->has(chain);
 }
 
 // Along the smooth ray that was chosen; false where the path ends. Its direction moves with the

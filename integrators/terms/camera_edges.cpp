@@ -2,8 +2,6 @@
 #include "integrators/terms/camera_edges.h"
 
 #include "integrators/estimates/splat.h"
-#include "integrators/terms/edge_difference.h"
-#include "integrators/terms/mirror_sight.h"
 
 namespace limn {
 namespace {
@@ -92,8 +90,7 @@ CameraEdges::CameraEdges(const PathContext& context, const EdgeSamplerInput& inp
                          const FreeMotion* free, const FilmRegions* visible)
     : FilmEdges(context, input, free),
       lanes_(free ? 3 : lanes),
-      visible_(visible),
-      views_(list_film_views(context, free != nullptr)) {
+      visible_(visible) {
   const Stopwatch watch;
   list();
   weigh({});
@@ -127,15 +124,6 @@ void CameraEdges::find_in_line(size_t first) {
   for (size_t e = 0; e < edges.size(); ++e) edges[e].in_line = found.in_line[e];
   if (!parting_ || first == 0) parting_ = found.parting;
   resting_ = {};
-}
-
-bool CameraEdges::may_move(const FilmEdge& edge, std::span<const FaceRef> faces) const {
-  if (free_->moves(faces)) return true;
-  const FilmView& view = views_[edge.view];
-  return std::ranges::any_of(
-      std::span(view.chain.mirrors).first(view.chain.count), [&](uint32_t m) {
-        return free_->moves(std::span(view.mirrors->mirrors()[m].faces).first(1));
-      });
 }
 
 // Lines keep their speeds where they are cut, which change linearly along them. Of edges in one
@@ -187,32 +175,11 @@ void CameraEdges::add_object(ShapeId object, uint32_t index, const CameraView<Du
   }
 }
 
-// By its motion at some places: it may move at others alone.
-void CameraEdges::add_refracted(ShapeId object, uint32_t index) {
-  constexpr int kPlaces = 4;  // not tuned
-  const FilmView& view = views_[index];
-  const EdgeMesh& mesh = input_.object(object);
-  for (uint32_t e = 0; e < mesh.edges.size(); ++e) {
+void CameraEdges::add_refracted(ShapeId object, uint32_t view) {
+  for (uint32_t e = 0; e < input_.object(object).edges.size(); ++e) {
     FilmEdge edge;
-    edge.id = {object, EdgeId(e)};
-    edge.view = index;
-    edge.refracted = true;
-    edge.x0 = edge.x1 = edge.y0 = edge.y1 = 0;
-    edge.t0 = 0, edge.t1 = 1, edge.depth0 = edge.depth1 = 1;
-    const auto [v0, v1] = mesh.edge(edge.id.edge).vertices;
-    if (view.touches_mirror(mesh.faces_around(edge.id.edge)) ||
-        !view.refracted->clip(mesh.position(v0), mesh.position(v1), edge.t0, edge.t1)) {
-      continue;
-    }
-    edge.length = 1;
-    for (int i = 0; i < kPlaces; ++i) {
-      const double t = edge.t0 + (edge.t1 - edge.t0) * (i + 0.5) / kPlaces;
-      const auto seen = view.refracted->see(mesh, edge.id.edge, t);
-      if (!seen || !view.window.holds(seen->at)) continue;
-      for (int k = 0; k < lanes_; ++k) {
-        edge.speed0[k] += std::fabs(seen->speed[k]) * seen->stretch * (edge.t1 - edge.t0) / kPlaces;
-      }
-    }
+    if (!place_refracted({object, EdgeId(e)}, view, edge)) continue;
+    add_speed(edge, {}, lanes_);
     edges_.push_back(edge);
   }
 }
@@ -281,53 +248,9 @@ std::optional<FilmEdgePoint> CameraEdges::choose(double u, const LensPoint&) con
   point.s = piece.s0 + (piece.s1 - piece.s0) * draw.fraction;
   point.at.x = edge.x0 + (edge.x1 - edge.x0) * point.s;
   point.at.y = edge.y0 + (edge.y1 - edge.y0) * point.s;
-  if (edge.refracted && !bend(point)) return {};
+  if (edge.refracted && !bend(point, {})) return {};
   point.density = draw.probability / (edge.length * (piece.s1 - piece.s0));
   return point;
-}
-
-// Puts a point onto the curve that is seen of its edge.
-bool CameraEdges::bend(FilmEdgePoint& point) const {
-  FilmEdge& edge = point.edge;
-  const EdgeMesh& mesh = input_.object(edge.id.object);
-  const auto seen = views_[edge.view].refracted->see(mesh, edge.id.edge, t_of(point));
-  if (!seen) return false;
-  point.refracted = *seen;
-  point.at = {seen->at, {}};
-  edge.nx = seen->nx, edge.ny = seen->ny;
-  edge.speed0 = edge.speed1 = seen->speed;
-  edge.length = seen->stretch * (edge.t1 - edge.t0);
-  return true;
-}
-
-// By way of mirrors the edge is where the camera's image sees it; rays tell what hides it.
-bool CameraEdges::jump_at(const FilmEdgePoint& point, const Rng& key, RayCount& rays,
-                          Rgb<double>& jump, MirrorFaces& by) const {
-  const FilmEdge& edge = point.edge;
-  if (edge.view == 0) return FilmEdges::jump_at(point, key, rays, jump, by);
-  const FilmView& view = views_[edge.view];
-  const EdgeMesh& mesh = input_.object(edge.id.object);
-  const auto& ends = mesh.edge(edge.id.edge).vertices;
-  const double t = t_of(point);
-  const Vec3d y = mesh.position(ends[0]) * (1 - t) + mesh.position(ends[1]) * t;
-  const LightOrigin image = edge.in_line ? view.viewpoint->aside(y)
-                                         : view.viewpoint->seeing(mesh.around(edge.id.edge), y);
-  const Camera& camera = scene().camera;
-  Ray ray{value(camera.origin), point.refracted.towards};
-  if (!edge.refracted) ray = unfolded(*view.mirrors, view.chain, value(image.v), y);
-  const double cosine = dot(ray.direction, value(camera.forward));
-  ray.t_min = camera.near_clip / cosine;
-  ray.t_max = camera.far_clip / cosine;
-  ray.skip_emitters = scene().hide_emitters;
-  MirrorSight sight;
-  if (!follow_mirrors(context_, view.chain, ray, 0, rays, sight)) return false;
-  EdgeView beyond;
-  if (!view_edge(mesh, edge.id, t, sight.from, beyond)) return false;
-  const EdgeViewer viewer{sight.last(), sight.bounces, key};
-  if (!edge_difference(context_, mesh, beyond, viewer, rays, jump)) return false;
-  jump = jump * sight.share;
-  by = sight.by;
-  return true;
 }
 
 }  // namespace limn

@@ -1,6 +1,6 @@
 #pragma once
-// Edges on the film that are listed once: seen from a pinhole, also by way of flat mirrors, or
-// along the direction of an orthographic camera.
+// Edges on the film that are listed once: seen from a pinhole, or along the direction of an
+// orthographic camera, also by way of flat mirrors.
 #include "integrators/film/film_regions.h"
 #include "integrators/terms/film_edges.h"
 #include "limn/core/discrete_distribution.h"
@@ -19,8 +19,6 @@ class CameraEdges final : public FilmEdges {
   size_t size() const override { return moving_; }
   const Parting& parting() const override { return parting_; }
   std::optional<FilmEdgePoint> choose(double u, const LensPoint& lens) const override;
-  bool jump_at(const FilmEdgePoint& point, const Rng& key, RayCount& rays, Rgb<double>& jump,
-               MirrorFaces& by) const override;
 
  private:
   static bool moves(const FilmEdge& edge) {
@@ -32,17 +30,14 @@ class CameraEdges final : public FilmEdges {
   void add_clip(uint32_t index);
   // faces: that the edge moves with.
   void add(const FilmEdge& edge, std::span<const FaceRef> faces) {
-    if (lists_all_ || (free_ ? may_move(edge, faces) : moves(edge))) {
+    if (lists_all_ || (free_ ? may_move(views_[edge.view], faces) : moves(edge))) {
       edges_.push_back(edge);
     } else {
       resting_.push_back(edge);
     }
   }
-  // Where no motion is known.
-  bool may_move(const FilmEdge& edge, std::span<const FaceRef> faces) const;
   // Of the edges from the first on, of one view.
   void find_in_line(size_t first);
-  bool bend(FilmEdgePoint& point) const;
   void keep_seen(const FilmRegions& visible);
   void weigh(const FilmMotionAt& motion);
   void add_pieces(uint32_t edge, const FilmMotionAt& motion);
@@ -56,7 +51,6 @@ class CameraEdges final : public FilmEdges {
 
   int lanes_;
   const FilmRegions* visible_;
-  std::vector<FilmView> views_;  // the camera first
   bool lists_all_ = false;
   std::vector<FilmEdge> edges_;  // that move, or all
   size_t moving_ = 0;

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "integrators/terms/edge_difference.h"
+#include "integrators/terms/mirror_sight.h"
 
 namespace limn {
 namespace {
@@ -67,7 +68,7 @@ bool FilmEdges::place(EdgeRef id, const CameraView<Dual>& view, FilmEdge& edge,
   const double far =
       context_.straight_ways ? std::numeric_limits<double>::infinity() : camera.far_clip;
   if (!clip_range(depth_a, depth_b - depth_a, near, far, t0, t1)) return false;
-  if (image && !image->clip_to_mirror(a, b, t0, t1)) return false;
+  if (image && !image->clip_to_mirror(pinhole, a, b, t0, t1)) return false;
 
   const auto at = [&](double t) { return a + (b - a) * t; };
   const auto film0 = film_of(view, at(t0));
@@ -124,6 +125,55 @@ bool FilmEdges::place_ends(const Vec3<Dual>& x0, const Vec3<Dual>& x1, const Vec
   return true;
 }
 
+bool FilmEdges::place_refracted(EdgeRef id, uint32_t index, FilmEdge& edge) const {
+  const FilmView& view = views_[index];
+  const EdgeMesh& mesh = input_.object(id.object);
+  const auto [v0, v1] = mesh.edge(id.edge).vertices;
+  edge.id = id;
+  edge.view = index;
+  edge.refracted = true;
+  edge.x0 = edge.x1 = edge.y0 = edge.y1 = 0;
+  edge.t0 = 0, edge.t1 = 1, edge.depth0 = edge.depth1 = 1;
+  edge.length = 1;
+  return !view.touches_mirror(mesh.faces_around(id.edge)) &&
+         view.refracted->clip(mesh.position(v0), mesh.position(v1), edge.t0, edge.t1);
+}
+
+void FilmEdges::add_speed(FilmEdge& edge, const LensPoint& lens, int lanes) const {
+  constexpr int kPlaces = 4;  // not tuned
+  const FilmView& view = views_[edge.view];
+  const EdgeMesh& mesh = input_.object(edge.id.object);
+  for (int i = 0; i < kPlaces; ++i) {
+    const double t = edge.t0 + (edge.t1 - edge.t0) * (i + 0.5) / kPlaces;
+    const auto seen = view.refracted->see(mesh, edge.id.edge, t, lens);
+    if (!seen || !view.window.holds(seen->at)) continue;
+    for (int k = 0; k < lanes; ++k) {
+      edge.speed0[k] += std::fabs(seen->speed[k]) * seen->stretch * (edge.t1 - edge.t0) / kPlaces;
+    }
+  }
+}
+
+bool FilmEdges::bend(FilmEdgePoint& point, const LensPoint& lens) const {
+  FilmEdge& edge = point.edge;
+  const EdgeMesh& mesh = input_.object(edge.id.object);
+  const auto seen = views_[edge.view].refracted->see(mesh, edge.id.edge, t_of(point), lens);
+  if (!seen) return false;
+  point.refracted = *seen;
+  point.at = {seen->at, lens};
+  edge.nx = seen->nx, edge.ny = seen->ny;
+  edge.speed0 = edge.speed1 = seen->speed;
+  edge.length = seen->stretch * (edge.t1 - edge.t0);
+  return true;
+}
+
+bool FilmEdges::may_move(const FilmView& view, std::span<const FaceRef> faces) const {
+  if (free_->moves(faces)) return true;
+  return std::ranges::any_of(
+      std::span(view.chain.mirrors).first(view.chain.count), [&](uint32_t m) {
+        return free_->moves(std::span(view.mirrors->mirrors()[m].faces).first(1));
+      });
+}
+
 double FilmEdges::t_of(const FilmEdgePoint& point) const {
   const FilmEdge& edge = point.edge;
   return edge.t0 + (edge.t1 - edge.t0) * fraction_in_space(point.s, edge.depth0, edge.depth1);
@@ -131,9 +181,9 @@ double FilmEdges::t_of(const FilmEdgePoint& point) const {
 
 Vec3d FilmEdges::viewer_of(const FilmEdgePoint& point, const FacesAround& around,
                            const Vec3d& y) const {
-  const Camera& camera = scene().camera;
+  const Camera& camera = views_[point.edge.view].camera;
   if (camera.has_lens()) return CameraView<double>(camera).at(point.at.lens).origin();
-  const Viewpoint& viewpoint = context_.viewpoints->camera;
+  const Viewpoint& viewpoint = *views_[point.edge.view].viewpoint;
   const LightOrigin origin = point.edge.in_line ? viewpoint.aside(y) : viewpoint.seeing(around, y);
   if (!origin.infinite) return value(origin.v);
   const Vec3d along = value(origin.v);
@@ -141,8 +191,9 @@ Vec3d FilmEdges::viewer_of(const FilmEdgePoint& point, const FacesAround& around
 }
 
 bool FilmEdges::jump_at(const FilmEdgePoint& point, const Rng& key, RayCount& rays,
-                        Rgb<double>& jump, MirrorFaces& /*by*/) const {
+                        Rgb<double>& jump, MirrorFaces& by) const {
   const FilmEdge& edge = point.edge;
+  if (edge.view != 0) return jump_beyond(point, key, rays, jump, by);
   const double t = t_of(point);
   const Camera& camera = scene().camera;
   if (edge.clip != FilmEdge::kNoClip) {
@@ -163,6 +214,39 @@ bool FilmEdges::jump_at(const FilmEdgePoint& point, const Rng& key, RayCount& ra
       context_, mesh, view,
       {{}, 0, key, {}, known_behind, camera.near_clip / cosine, camera.far_clip / cosine}, rays,
       jump);
+}
+
+// By way of mirrors the edge is where the camera's image sees it; rays tell what hides it.
+bool FilmEdges::jump_beyond(const FilmEdgePoint& point, const Rng& key, RayCount& rays,
+                            Rgb<double>& jump, MirrorFaces& by) const {
+  const FilmEdge& edge = point.edge;
+  const FilmView& view = views_[edge.view];
+  const EdgeMesh& mesh = input_.object(edge.id.object);
+  const auto& ends = mesh.edge(edge.id.edge).vertices;
+  const double t = t_of(point);
+  const Vec3d y = mesh.position(ends[0]) * (1 - t) + mesh.position(ends[1]) * t;
+  const Camera& camera = scene().camera;
+  Ray ray;
+  if (edge.refracted) {
+    const auto to_film = ray_at(CameraView<double>(camera), point.at);
+    ray = {to_film.origin, to_film.direction};
+  } else {
+    const Vec3d image = viewer_of(point, mesh.around(edge.id.edge), y);
+    ray = unfolded(*view.mirrors, view.chain, image, y);
+  }
+  const double cosine = dot(ray.direction, value(camera.forward));
+  ray.t_min = camera.near_clip / cosine;
+  ray.t_max = camera.far_clip / cosine;
+  ray.skip_emitters = scene().hide_emitters;
+  MirrorSight sight;
+  if (!follow_mirrors(context_, view.chain, ray, 0, rays, sight)) return false;
+  EdgeView beyond;
+  if (!view_edge(mesh, edge.id, t, sight.from, beyond)) return false;
+  const EdgeViewer viewer{sight.last(), sight.bounces, key};
+  if (!edge_difference(context_, mesh, beyond, viewer, rays, jump)) return false;
+  jump = jump * sight.share;
+  by = sight.by;
+  return true;
 }
 
 }  // namespace limn

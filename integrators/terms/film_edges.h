@@ -21,7 +21,7 @@ struct FilmEdge : FilmLine {
   EdgeRef id;
   static constexpr uint32_t kNoClip = UINT32_MAX;
   uint32_t clip = kNoClip;  // the clip segment that it is, in the place of an edge
-  uint32_t view = 0;        // by which flat mirrors it is seen, see CameraEdges; 0: by none
+  uint32_t view = 0;        // by which flat mirrors it is seen, of views_; 0: by none
   bool refracted = false;   // a curve: its ends are not on the film
   double t0, t1;            // the part of the edge that may reach the film: its ends
   Lanes speed0, speed1;     // v_n there [pixels]; n points to the positive side of EdgeView::side
@@ -59,7 +59,11 @@ class FilmEdges {
   // lanes (relative to the camera); null: what the scene's tangents move, with their speeds. Edges
   // of faces seen edge-on, and edges behind others in one line: see Viewpoint.
   FilmEdges(const PathContext& context, const EdgeSamplerInput& input, const FreeMotion* free)
-      : context_(context), input_(input), free_(free), clips_(find_clip_segments(context.scene)) {}
+      : context_(context),
+        input_(input),
+        free_(free),
+        clips_(find_clip_segments(context.scene)),
+        views_(list_film_views(context, free != nullptr)) {}
   virtual ~FilmEdges() = default;
 
   // Edges are drawn by how fast they move against positions on the film, which may move from now
@@ -79,8 +83,8 @@ class FilmEdges {
   // Where the point is on its edge, in space: (1 - t) of the edge's first end and t of the other.
   double t_of(const FilmEdgePoint& point) const;
   // dL there, and on which mirrors it is seen; false if it is hidden.
-  virtual bool jump_at(const FilmEdgePoint& point, const Rng& key, RayCount& rays,
-                       Rgb<double>& jump, MirrorFaces& by) const;
+  bool jump_at(const FilmEdgePoint& point, const Rng& key, RayCount& rays, Rgb<double>& jump,
+               MirrorFaces& by) const;
 
  protected:
   const Scene& scene() const { return context_.scene; }
@@ -92,6 +96,15 @@ class FilmEdges {
   bool place(EdgeRef id, const CameraView<Dual>& view, FilmEdge& edge,
              const FilmView* image = nullptr) const;
   bool place(uint32_t clip, const CameraView<Dual>& view, FilmEdge& edge) const;
+  // The same through panes, but for where on the film.
+  bool place_refracted(EdgeRef id, uint32_t view, FilmEdge& edge) const;
+  // Adds how fast it moves there, times its length: by its motion at some places, as it may move at
+  // others alone.
+  void add_speed(FilmEdge& edge, const LensPoint& lens, int lanes) const;
+  // Puts a point onto the curve that is seen of its edge, through a point of the lens.
+  bool bend(FilmEdgePoint& point, const LensPoint& lens) const;
+  // Where no motion is known: whether an edge that moves with these faces may move as it is seen.
+  bool may_move(const FilmView& view, std::span<const FaceRef> faces) const;
   // The faces whose vertices an edge hangs on: of its own mesh, or, where two faces cross, both.
   static std::span<const FaceRef> faces_that_move(const EdgeMesh& mesh, EdgeId edge) {
     const auto faces = mesh.faces_around(edge);
@@ -107,13 +120,16 @@ class FilmEdges {
   const EdgeSamplerInput& input_;
   const FreeMotion* free_;
   std::vector<ClipSegment> clips_;
+  std::vector<FilmView> views_;  // the camera first
   double list_seconds_ = 0;
 
  private:
   Vec3<Dual> moving(const Vec3d& x, const Vec3<Lanes>& velocity) const;
   bool place_ends(const Vec3<Dual>& x0, const Vec3<Dual>& x1, const Vec3d& side,
                   const CameraView<Dual>& view, FilmEdge& edge) const;
-  // The point that sees y, a point of the edge.
+  bool jump_beyond(const FilmEdgePoint& point, const Rng& key, RayCount& rays, Rgb<double>& jump,
+                   MirrorFaces& by) const;
+  // The point that sees y, a point of the edge; that of the camera's image, by way of mirrors.
   Vec3d viewer_of(const FilmEdgePoint& point, const FacesAround& around, const Vec3d& y) const;
 };
 

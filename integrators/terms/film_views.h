@@ -1,5 +1,5 @@
 #pragma once
-// From where the camera sees edges: itself, and a pinhole's images in chains of flat mirrors.
+// From where the camera sees edges: itself, and its images in chains of flat mirrors.
 #include <algorithm>
 #include <memory>
 #include <span>
@@ -30,6 +30,12 @@ struct FilmWindow {
 // Where a film position can matter to a pixel of the crop window.
 FilmWindow sampled_window(const Film& film);
 
+// A point on the side of a plane from which a camera looks at x, a point of the plane; of a lens
+// its center.
+inline Vec3d eye_before(const Camera& camera, const Vec3d& x) {
+  return camera.is_orthographic() ? x - value(camera.forward) : value(camera.origin);
+}
+
 struct FilmView {
   FlatMirrors::Chain chain;  // empty: the camera itself
   Camera camera;             // its image
@@ -48,8 +54,10 @@ struct FilmView {
       return mirrors->of(face) == last_mirror();
     });
   }
-  // Cuts the segment from a to b to what lies before the last mirror.
-  bool clip_to_mirror(const Vec3d& a, const Vec3d& b, double& t0, double& t1) const;
+  // Cuts the segment from a to b to what lies before the last mirror. origin: of
+  // the image, or the point of its lens.
+  bool clip_to_mirror(const Vec3d& origin, const Vec3d& a, const Vec3d& b, double& t0,
+                      double& t1) const;
 };
 
 // The camera, then its images in chains of mirrors that may show it something, then what it sees

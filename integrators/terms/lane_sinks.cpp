@@ -185,7 +185,7 @@ void FilmLanes::add(const Rgb<double>& amount) {
   added_ = true;
   sample_.value = {rate_ * amount.r, rate_ * amount.g, rate_ * amount.b};
   if (!moves_film_) return;
-  const auto ray = shifted_ray(scene_.camera, sample_.x, sample_.y);
+  const auto ray = shifted_ray(scene_.camera, {{sample_.x, sample_.y}});
   const Vec3<Lanes> v = velocity_of(ray.origin) + velocity_of(ray.direction) * form_->distance;
   // Against positions that move.
   const Lanes rate = along(v, form_->of_ray()) * -form_->scale;

@@ -1,5 +1,5 @@
 #pragma once
-// Edges on the film of a camera with a lens. Each point of the lens has silhouettes of its own,
+// Edges on the film of a camera with a lens, also by way of flat mirrors. Each point of the lens has silhouettes of its own,
 // elsewhere on the film. Edges that some point of the lens may see are listed once; a sample
 // chooses an edge and a point, tests exactly whether the edge is a silhouette from there, and draws
 // from what of it is then on the film. In plant.xml 98, 96 and 89 % of the draws were on the film
@@ -24,17 +24,19 @@ class LensEdges final : public FilmEdges {
   struct Listed {
     EdgeRef id;
     uint32_t clip = FilmEdge::kNoClip;
+    uint32_t view = 0;  // of views_
     Lanes weight;  // mean length times speed
   };
   void list();
-  void add_object(ShapeId object);
-  bool may_be_candidate(const EdgeMesh& mesh, EdgeId edge) const;
-  bool moves(const EdgeMesh& mesh, EdgeId edge) const;
-  bool place(const Listed& listed, const CameraView<Dual>& view, FilmEdge& edge) const;
+  void add_object(ShapeId object, uint32_t view);
+  bool may_be_seen(const EdgeMesh& mesh, EdgeId edge, uint32_t view) const;
+  bool may_be_candidate(const EdgeMesh& mesh, EdgeId edge, const Vec3d& center) const;
+  bool moves(const EdgeMesh& mesh, EdgeId edge, uint32_t view) const;
+  bool place(const Listed& listed, const LensPoint& lens, FilmEdge& edge) const;
   void weigh();
 
   int lanes_;
-  CameraView<Dual> view_;
+  std::vector<CameraView<Dual>> images_;  // of each of views_
   std::vector<Listed> listed_;
   DiscreteDistribution choice_;
   Parting parting_;  // none: that two edges lie in one line is true for no area of the lens

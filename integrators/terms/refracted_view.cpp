@@ -6,6 +6,7 @@
 
 #include "integrators/edges/flat_layers.h"
 #include "integrators/film/film_point.h"
+#include "integrators/terms/film_views.h"
 #include "integrators/terms/mirror_sight.h"
 
 namespace limn {
@@ -20,10 +21,12 @@ Vec3<Lanes> velocity_of(const Vec3<Dual>& v) { return {v.x.d, v.y.d, v.z.d}; }
 RefractedView::RefractedView(const PathContext& context, const FlatMirrors::Chain& chain, bool free)
     : context_(context), chain_(chain), free_(free) {
   const FlatMirrors& planes = *context.flat_mirrors;
-  const Vec3d eye = value(context.scene.camera.origin);
+  const Camera& camera = context.scene.camera;
+  const Vec3d eye = value(camera.origin);
   const MirrorPlane<double> first = planes.plane(chain.mirrors[0]);
-  n_ = first.distance(eye) < 0 ? first.n : -first.n;
-  double depth = 0;
+  n_ = first.distance(eye_before(camera, first.point)) < 0 ? first.n : -first.n;
+  // Parallel rays start before and behind the origin.
+  double depth = camera.is_orthographic() ? -std::numeric_limits<double>::infinity() : 0;
   index_[0] = 1;
   for (uint32_t k = 0; k < chain.count; ++k) {
     const MirrorPlane<double> plane = planes.plane(chain.mirrors[k]);
@@ -46,8 +49,8 @@ bool RefractedView::clip(const Vec3d& a, const Vec3d& b, double& t0, double& t1)
 }
 
 // Lanes 0 and 1: of the film position; all else is at rest.
-RefractedView::Carried<Dual> RefractedView::carried_by_film(const FilmPosition& at) const {
-  const CameraRay<Dual> ray = shifted_ray(context_.scene.camera, at.x, at.y);
+RefractedView::Carried<Dual> RefractedView::carried_by_film(const FilmPlace& at) const {
+  const CameraRay<Dual> ray = shifted_ray(context_.scene.camera, at);
   Vec3<Dual> origin = ray.origin, d = ray.direction;
   const Vec3<Dual> n{n_.x, n_.y, n_.z};
   for (uint32_t k = 0; k < chain_.count; ++k) {
@@ -61,8 +64,8 @@ RefractedView::Carried<Dual> RefractedView::carried_by_film(const FilmPosition& 
 }
 
 // As the parameters move the camera, the planes and their indices.
-RefractedView::Carried<Dual> RefractedView::carried_by_scene(const FilmPosition& at) const {
-  const auto ray = CameraView<Dual>(context_.scene.camera).ray(at.x, at.y);
+RefractedView::Carried<Dual> RefractedView::carried_by_scene(const FilmPlace& at) const {
+  const auto ray = ray_at(CameraView<Dual>(context_.scene.camera), at);
   MirrorFaces faces;
   for (uint32_t k = 0; k < chain_.count; ++k) {
     faces.faces[k] = context_.flat_mirrors->mirrors()[chain_.mirrors[k]].faces[0];
@@ -73,25 +76,47 @@ RefractedView::Carried<Dual> RefractedView::carried_by_scene(const FilmPosition&
   return carried;
 }
 
-std::optional<RefractedPoint> RefractedView::see(const EdgeMesh& mesh, EdgeId edge,
-                                                 double t) const {
-  const auto [v0, v1] = mesh.edge(edge).vertices;
-  const Vec3d a = mesh.position(v0), b = mesh.position(v1), y = a * (1 - t) + b * t;
+std::optional<FilmPlace> RefractedView::place(const Vec3d& y, const LensPoint& lens) const {
   const Camera& camera = context_.scene.camera;
-  const Vec3d eye = value(camera.origin);
+  const auto view = CameraView<double>(camera).at(lens);
+  const Vec3d center = value(camera.origin), forward = value(camera.forward);
+  if (camera.is_orthographic()) {
+    // Parallel rays are parallel in each layer: back from y to the first plane.
+    Vec3d x = y;
+    for (uint32_t k = chain_.count; k > 0; --k) {
+      const double end = k < chain_.count ? depth_[k] : dot(n_, y - center);
+      const double r = index_[0] / index_[k], c = dot(n_, forward);
+      const Vec3d across = (forward - n_ * c) * r;
+      const double root = 1 - length_squared(across);
+      if (!(root > 0)) return {};
+      x = x - (across / std::sqrt(root) + n_) * (end - depth_[k - 1]);
+    }
+    return FilmPlace{view.project(x), lens};
+  }
+  const Vec3d eye = view.origin();
   std::array<FlatLayer, 3> layers;
-  double depth = 0;
+  double depth = dot(n_, eye - center);
   for (uint32_t k = 0; k <= chain_.count; ++k) {
-    const double end = k < chain_.count ? depth_[k] : dot(n_, y - eye);
+    const double end = k < chain_.count ? depth_[k] : dot(n_, y - center);
     layers[k] = {end - depth, index_[k]};
     depth = end;
   }
-  RefractedPoint point;
-  point.towards = direction_through({layers.data(), chain_.count + 1}, n_, y - eye);
-  if (!(dot(point.towards, value(camera.forward)) > 0)) return {};
-  point.at = camera.project(eye + point.towards);
+  if (!(layers[0].height > 0)) return {};
+  const Vec3d towards = direction_through({layers.data(), chain_.count + 1}, n_, y - eye);
+  if (!(dot(towards, forward) > 0)) return {};
+  return FilmPlace{view.project(eye + towards), lens};
+}
 
-  const Carried<Dual> film = carried_by_film(point.at);
+std::optional<RefractedPoint> RefractedView::see(const EdgeMesh& mesh, EdgeId edge, double t,
+                                                 const LensPoint& lens) const {
+  const auto [v0, v1] = mesh.edge(edge).vertices;
+  const Vec3d a = mesh.position(v0), b = mesh.position(v1), y = a * (1 - t) + b * t;
+  const auto at = place(y, lens);
+  if (!at) return {};
+  RefractedPoint point;
+  point.at = *at;
+
+  const Carried<Dual> film = carried_by_film(*at);
   const Vec3d q = value(film.origin), d = value(film.direction);
   if (!is_candidate(mesh, edge, q)) return {};
   const double distance = dot(d, y - q);
@@ -112,7 +137,7 @@ std::optional<RefractedPoint> RefractedView::see(const EdgeMesh& mesh, EdgeId ed
   }
   Vec3<Lanes> own;
   if (!mesh.tangents.empty()) own = mesh.tangent(v0) * (1 - t) + mesh.tangent(v1) * t;
-  const Carried<Dual> ray = carried_by_scene(point.at);
+  const Carried<Dual> ray = carried_by_scene(*at);
   own = own - velocity_of(ray.origin) - velocity_of(ray.direction) * distance;
   point.speed = along(own, point.g);
   return point;

@@ -126,10 +126,17 @@ def sensor_xml(camera):
     moved = np.any(camera.shift != 0) or np.any(camera.turn != np.eye(3))
     target = origin + 4 * axes[2] if moved else camera.target
     up = axes[1] if moved else camera.up_hint
-    return (f'  <sensor type="perspective">\n'
-            f'    <string name="fov_axis" value="x"/><float name="fov" value="{camera.fov:.12g}"/>\n'
-            f'    <float name="near_clip" value="0.01"/><float name="far_clip" value="1000"/>\n'
-            f'    <transform name="to_world"><lookat origin="{numbers(origin)}" '
+    kind = "orthographic" if camera.half_width else "thinlens" if camera.radius else "perspective"
+    text, scale = f'  <sensor type="{kind}">\n', ""
+    if camera.half_width:
+        scale = f'<scale x="{camera.half_width:.12g}" y="{camera.half_width:.12g}"/>'
+    else:
+        text += f'    <string name="fov_axis" value="x"/><float name="fov" value="{camera.fov:.12g}"/>\n'
+    if camera.radius:
+        text += (f'    <float name="aperture_radius" value="{camera.radius:.12g}"/>'
+                 f'<float name="focus_distance" value="{camera.focus:.12g}"/>\n')
+    return (text + f'    <float name="near_clip" value="0.01"/><float name="far_clip" value="1000"/>\n'
+            f'    <transform name="to_world">{scale}<lookat origin="{numbers(origin)}" '
             f'target="{numbers(target)}" up="{numbers(up)}"/></transform>\n'
             f'    <sampler type="independent">'
             f'<integer name="sample_count" value="$spp"/></sampler>\n'

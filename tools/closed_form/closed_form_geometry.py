@@ -59,6 +59,10 @@ class Camera:
     turn: np.ndarray = field(default_factory=lambda: np.eye(3))  # applied to the axes after lookat
     shift: np.ndarray = field(default_factory=lambda: np.zeros(3))
     filter: str = "box"
+    half_width: float = 0.0  # of an orthographic film, in place of fov
+    radius: float = 0.0  # of a thin lens
+    focus: float = 1.0  # distance along the view of what is in focus
+    at: tuple = (0.0, 0.0)  # a point of the lens, in radii along left and up
 
     def axes(self):
         """Rows: left, up, forward."""
@@ -67,22 +71,30 @@ class Camera:
         return np.stack([left, np.cross(forward, left), forward]) @ self.turn.T
 
     def pinhole(self):
-        return self.origin + self.shift
+        offset = self.radius * (self.at[0] * self.axes()[0] + self.at[1] * self.axes()[1])
+        return self.origin + self.shift + offset
+
+    def size(self):
+        """Of half the film [x, y]: at depth 1, or as it is if it is orthographic."""
+        x = self.half_width or np.tan(np.radians(self.fov) / 2)
+        return x * np.array([1, self.height / self.width])
 
     def directions(self, film):
         """film: N by 2 [pixels] -> N by 3 unit directions."""
-        t = np.tan(np.radians(self.fov) / 2)
-        x = (1 - 2 * film[:, 0] / self.width) * t
-        y = (1 - 2 * film[:, 1] / self.height) * t * self.height / self.width
-        return unit(np.stack([x, y, np.ones_like(x)], axis=1) @ self.axes())
+        if self.half_width:
+            return np.tile(self.axes()[2], (len(film), 1))
+        xy = (1 - 2 * film / [self.width, self.height]) * self.size()
+        xy = xy - self.radius / self.focus * np.array(self.at)
+        return unit(np.column_stack([xy, np.ones(len(xy))]) @ self.axes())
 
     def project(self, points):
         """points: N by 3 in front of the pinhole -> N by 2 film positions [pixels]."""
         local = (points - self.pinhole()) @ self.axes().T
-        t = np.tan(np.radians(self.fov) / 2)
-        xy = local[:, :2] / local[:, 2:] / t
-        xy[:, 1] *= self.width / self.height
-        return (1 - xy) / 2 * np.array([self.width, self.height])
+        if self.half_width:
+            xy = local[:, :2]
+        else:
+            xy = local[:, :2] / local[:, 2:] + self.radius / self.focus * np.array(self.at)
+        return (1 - xy / self.size()) / 2 * np.array([self.width, self.height])
 
 
 @dataclass
@@ -172,8 +184,9 @@ def moved(scene, name, step):
 
 
 def move_camera(camera, what, axis, step):
-    if what == "fov":
-        camera.fov += step
+    if what in ("fov", "aperture_radius", "focus_distance"):
+        field_name = {"aperture_radius": "radius", "focus_distance": "focus"}.get(what, what)
+        setattr(camera, field_name, getattr(camera, field_name) + step)
     elif what == "translate":
         camera.shift[axis] += step
     elif what == "rotate":
@@ -253,6 +266,16 @@ def through_layers(eye, points, planes, indices):
         slope = np.sum(heights * ratios / (1 + (1 - ratios**2) * u**2)**1.5, axis=0)
         u = u + (distance - np.sum(heights * tangents(u), axis=0)) / slope
     return unit(normal + across * (tangents(u)[0] / distance)[:, None])
+
+
+def along_layers(direction, points, planes, indices):
+    """Points (N by 3), carried back along parallel rays of this direction to the first of the planes."""
+    normal = loop_normal(planes[0]) * np.sign(np.dot(direction, loop_normal(planes[0])))
+    for plane, index in reversed(list(zip(planes, indices))):
+        across = (direction - np.dot(direction, normal) * normal) / index
+        way = across / np.sqrt(1 - np.dot(across, across)) + normal
+        points = points - np.outer((points - plane[0]) @ normal, way)
+    return points
 
 
 def hit_plane(camera, film, loop):

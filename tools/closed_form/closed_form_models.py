@@ -9,11 +9,14 @@ can be moved in one copy alone (directions omega are held fixed in solid angle w
 All three moved together give the picture of the moved scene, so the terms add up to its derivative.
 `order` is the number of Gauss nodes per axis. Images are height by width by 3.
 """
+import copy
+import dataclasses
+
 import numpy as np
 
-from closed_form_geometry import (clip, clip_box, clip_convex, hit_plane, loop_normal, loop_rule,
-                                  mirrored, ramp, shadow_on_plane, square_rule, squares,
-                                  through_layers, unit)
+from closed_form_geometry import (along_layers, clip, clip_box, clip_convex, gauss, hit_plane,
+                                  loop_normal, loop_rule, mirrored, ramp, shadow_on_plane,
+                                  square_rule, squares, through_layers, unit)
 from closed_form_radiance import (Filter, convex_vector, lobe, lobe_over_polygon, polygon_area,
                                   polygon_vector)
 
@@ -97,34 +100,40 @@ class HalfHiddenLamp(FloorModel):
 
 
 class LampInMirror(FloorModel):
-    """A lamp over a diffuse plane, which sees it also in the flat shape "mirror" of reflectance R:
-    L = rho / pi L_e (n.Phi(lamp) + R n.Phi(the lamp's image cut by the mirror as p sees it))."""
+    """A lamp over a diffuse plane, which sees it also in flat shapes of reflectances R_i, by chains of
+    them: L = rho / pi L_e n.(Phi(lamp) + sum over chains of prod R_i Phi(the lamp's image cut by the
+    mirrors, those after the first by their images, as p sees them))."""
 
-    window = "mirror"
+    def __init__(self, *chains):
+        self.chains = chains  # of names, in the order in which the plane sees them
 
-    def image_of(self, lamp, window):
-        return mirrored(lamp, window)[::-1]
-
-    def share(self, shade):
-        return shade.shapes["mirror"].bsdf.reflectance
+    def images(self, shade, outline, lamp):
+        """(loop, windows that cut it, what it counts) of each."""
+        for chain in self.chains:
+            loops = [outline.shapes[name].face(0) for name in chain] + [lamp]
+            for k in reversed(range(len(chain))):
+                loops[k + 1:] = [mirrored(loop, loops[k])[::-1] for loop in loops[k + 1:]]
+            yield loops[-1], loops[:-1], np.prod(
+                [shade.shapes[name].bsdf.reflectance for name in chain], axis=0)
 
     def radiance(self, shade, outline, p, viewer, order):
-        lamp, window = lamp_loop(outline, p), outline.shapes[self.window].face(0)
-        image = self.image_of(lamp, window)
-        phi, patterns = np.zeros_like(p), set()
-        for k, point in enumerate(p):
-            seen, pattern = image, []
-            for a, b in zip(window, np.roll(window, -1, axis=0)):
-                side = np.cross(a - point, b - point)
-                side = side * np.sign(np.dot(window.mean(axis=0) - point, side))
-                pattern += [*((image - point) @ side > 0)]
-                seen = clip(seen, side, np.dot(point, side))
-            patterns.add((len(seen), *pattern))
-            phi[k] = polygon_vector(point[None], seen)[0]
-        assert len(patterns) == 1, "the clipped image changes within a pixel"
-        share = self.share(shade)
-        irradiance = (polygon_vector(p, lamp) @ floor_normal(shade))[:, None]
-        irradiance = irradiance + (phi @ floor_normal(shade))[:, None] * share
+        lamp, n = lamp_loop(outline, p), floor_normal(shade)
+        irradiance = (polygon_vector(p, lamp) @ n)[:, None]
+        for image, windows, share in self.images(shade, outline, lamp):
+            phi, patterns = np.zeros_like(p), set()
+            for k, point in enumerate(p):
+                seen, pattern = image, []
+                for window in windows:
+                    for a, b in zip(window, np.roll(window, -1, axis=0)):
+                        side = np.cross(a - point, b - point)
+                        side = side * np.sign(np.dot(window.mean(axis=0) - point, side))
+                        pattern += [*((image - point) @ side > 0)]
+                        seen = clip(seen, side, np.dot(point, side))
+                patterns.add((len(seen), *pattern))
+                phi[k] = polygon_vector(point[None], seen)[0]
+            assert len(patterns) == 1, "the clipped image changes within a pixel"
+            assert len(seen), "nothing of an image is seen"
+            irradiance = irradiance + (phi @ n)[:, None] * share
         return (irradiance * shade.shapes["lamp"].radiance
                 * shade.shapes["floor"].bsdf.reflectance / np.pi)
 
@@ -133,28 +142,8 @@ class LampBehindMask(LampInMirror):
     """A lamp over a diffuse plane, partly behind the flat shape "mask" of opacity o:
     L = rho / pi L_e (n.Phi(lamp) - o n.Phi(the lamp cut by the mask as p sees it))."""
 
-    window = "mask"
-
-    def image_of(self, lamp, window):
-        return lamp
-
-    def share(self, shade):
-        return -shade.shapes["mask"].bsdf.opacity
-
-
-def faces_before(shape, eye, loop):
-    """What an eye (3) sees of a convex mesh that passes through the plane of `loop`, which hides all
-    behind it: the front faces, clipped by the plane, and a key that says which they are."""
-    normal = loop_normal(loop)
-    assert np.dot(eye - loop[0], normal) > 0, "the plane is seen from behind"
-    parts, pattern = [], []
-    for k, face in enumerate(shape.faces):
-        corners = shape.vertices[face]
-        above = (corners - loop[0]) @ normal > 0
-        if np.dot(eye - corners[0], loop_normal(corners)) > 0 and np.any(above):
-            parts.append(clip(corners, normal, np.dot(loop[0], normal)))
-            pattern.append((k, *above))
-    return parts, tuple(pattern)
+    def images(self, shade, outline, lamp):
+        yield lamp, [outline.shapes["mask"].face(0)], -shade.shapes["mask"].bsdf.opacity
 
 
 class CrossingLampsOnFloor(FloorModel):
@@ -480,6 +469,9 @@ class LampsThroughGlass:
 
     def film(self, scene, points):
         eye = scene.camera.pinhole()
+        if scene.camera.half_width:
+            return scene.camera.project(
+                along_layers(scene.camera.axes()[2], points, *self.layers(scene)))
         return scene.camera.project(eye + through_layers(eye, points, *self.layers(scene)))
 
     def image(self, domain, shade, outline, shadow, order):
@@ -499,6 +491,28 @@ class LampsThroughGlass:
             assert np.all(np.floor(film) == [column, row]), "a lamp is in several pixels"
             share = passed(shade.camera, film, *self.layers(shade))
             result[row, column] += (weights * size) @ share * shade.shapes[name].radiance
+        return result
+
+
+class ThroughLens:
+    """The mean of another model over the points of a lens."""
+
+    outlines_in_view = True
+
+    def __init__(self, model):
+        self.model = model
+
+    def image(self, domain, shade, outline, shadow, order):
+        nodes, weights = gauss(order // 2 + 1)
+        angles = (np.arange(2 * order) + 0.25) * (np.pi / order)
+        result = 0
+        for u, weight in zip(nodes, weights):
+            for angle in angles:
+                at = (np.sqrt(u) * np.cos(angle), np.sqrt(u) * np.sin(angle))
+                scenes = [copy.copy(s) for s in (domain, shade, outline, shadow)]
+                for scene in scenes:
+                    scene.camera = dataclasses.replace(scene.camera, at=at)
+                result = result + weight / len(angles) * self.model.image(*scenes, order)
         return result
 
 

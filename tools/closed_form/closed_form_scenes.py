@@ -191,6 +191,26 @@ def square_in_mirror():
     return scene, models.LampsInMirror(), names
 
 
+def orthographic_mirror():
+    """The same with the lamps where parallel rays meet both; the only pixel sees all of the mirror."""
+    scene, model, names = square_in_mirror()
+    scene.shapes["near"].vertices[:, 1] -= 0.125
+    scene.shapes["far"].vertices += vector(-0.875, 0.25, 0)
+    return scene, model, [n for n in names if not n.startswith("sensor.translate")]
+
+
+def by_another_camera(made, name, names=None, **changes):
+    """The scene with another camera. names: parameters, if not all."""
+    scene, model, all_names = made
+    names = names or all_names
+    scene.name = f"{name}.xml"
+    for field, value in changes.items():
+        setattr(scene.camera, field, value)
+    if scene.camera.half_width:
+        return scene, model, [n for n in names if n != "sensor.fov"]
+    return scene, models.ThroughLens(model), names + ["sensor.aperture_radius"]
+
+
 def lamp_in_mirror():
     """The floor sees a part of the lamp in a mirror beside it, too."""
     mirror = parallelogram((-1.5, 0.125, 0), (0.125, 1.25, 0), (0.0625, 0.125, 2))
@@ -202,7 +222,7 @@ def lamp_in_mirror():
     names = moves_of("mirror") + ["lamp.translate.x", "lamp.translate.y", "lamp.rotate.z",
                                   "floor.translate.y", "floor.rotate.x", "sensor.translate.x",
                                   "lamp_emitter.radiance", "mirror_bsdf.specular_reflectance"]
-    return scene, models.LampInMirror(), names
+    return scene, models.LampInMirror(["mirror"]), names
 
 
 def through_glass(name, glass, moves, max_depth, *faces):
@@ -410,6 +430,14 @@ SCENES = {
     "lamps_in_view_tent": lambda: lamps_in_view("tent"),
     "lamps_in_view_gaussian": lambda: lamps_in_view("gaussian"),
     "square_in_mirror": square_in_mirror,
+    "square_in_mirror_orthographic": lambda: by_another_camera(
+        orthographic_mirror(), "square_in_mirror_orthographic", half_width=1.0625, width=1,
+        height=1),
+    "square_in_mirror_thinlens": lambda: by_another_camera(
+        square_in_mirror(), "square_in_mirror_thinlens",
+        ["sensor.translate.x", "sensor.rotate.y", "mirror.translate.z", "mirror.rotate.y",
+         "near.translate.x", "near.rotate.z", "far.translate.y", "far.scale",
+         "mirror_bsdf.specular_reflectance"], radius=0.0625, focus=3.5, width=1, height=1),
     "lamp_in_mirror": lamp_in_mirror,
     "lamps_behind_mask": lamps_behind_mask,
     "lamp_behind_mask": lamp_behind_mask,
