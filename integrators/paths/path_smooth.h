@@ -48,7 +48,8 @@ inline bool PathTracer<S, Visitor>::hides_edges(Walk& walk, const Vec3d& wo) con
   chain.through = through;
   const Vec3d n = walk.scattering->front() ? walk.surface.n_g : -walk.surface.n_g;
   // The camera sees all of them, vertices see nothing refracted.
-  return (walk.was_rough && through) || (!through && !is_mirrored(n, value(walk.wi), wo)) || !mirrors->has(chain);
+  return (walk.was_rough && through) || (!through && !is_mirrored(n, value(walk.wi), wo)) ||
+         !mirrors->has(chain);
 }
 
 // Along the smooth ray that was chosen; false where the path ends. Its direction moves with the

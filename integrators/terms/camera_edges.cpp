@@ -88,9 +88,7 @@ class SpeedAgainstFilm {
 
 CameraEdges::CameraEdges(const PathContext& context, const EdgeSamplerInput& input, int lanes,
                          const FreeMotion* free, const FilmRegions* visible)
-    : FilmEdges(context, input, free),
-      lanes_(free ? 3 : lanes),
-      visible_(visible) {
+    : FilmEdges(context, input, free), lanes_(free ? 3 : lanes), visible_(visible) {
   const Stopwatch watch;
   list();
   weigh({});

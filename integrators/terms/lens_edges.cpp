@@ -50,8 +50,8 @@ void LensEdges::add_object(ShapeId object, uint32_t view) {
 }
 
 bool LensEdges::may_be_seen(const EdgeMesh& mesh, EdgeId edge, uint32_t view) const {
-  const bool out = view == 0 ? is_hidden(mesh, edge)
-                             : views_[view].touches_mirror(mesh.faces_around(edge));
+  const bool out =
+      view == 0 ? is_hidden(mesh, edge) : views_[view].touches_mirror(mesh.faces_around(edge));
   return !out && may_be_candidate(mesh, edge, value(images_[view].origin()));
 }
 
@@ -87,8 +87,7 @@ bool LensEdges::place(const Listed& listed, const LensPoint& lens, FilmEdge& edg
   if (listed.clip != FilmEdge::kNoClip) return FilmEdges::place(listed.clip, view, edge);
   const EdgeMesh& mesh = input_.object(listed.id.object);
   return is_candidate(mesh, listed.id.edge, value(view.origin())) &&
-         FilmEdges::place(listed.id, view, edge,
-                          listed.view == 0 ? nullptr : &views_[listed.view]);
+         FilmEdges::place(listed.id, view, edge, listed.view == 0 ? nullptr : &views_[listed.view]);
 }
 
 // By the mean of projected length times speed; every parameter gets an equal share of the samples,
@@ -127,14 +126,13 @@ std::optional<FilmEdgePoint> LensEdges::choose(double u, const LensPoint& lens) 
   FilmEdge& edge = point.edge;
   if (!place(listed_[draw.index], lens, edge)) return {};
   point.s = draw.fraction;
+  point.density = draw.probability / edge.length;
   if (edge.refracted) {
     if (!bend(point, lens)) return {};
-    point.density = draw.probability / edge.length;
     return point;
   }
   point.at = {{edge.x0 + (edge.x1 - edge.x0) * point.s, edge.y0 + (edge.y1 - edge.y0) * point.s},
               lens};
-  point.density = draw.probability / edge.length;
   return point;
 }
 

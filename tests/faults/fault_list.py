@@ -41,7 +41,7 @@ FAULTS = [
           "point.density = draw.probability /", "point.density = 1.1 * draw.probability /",
           POWER, "*/camera"),
     Fault("camera", "edges seen from the center of the lens", TERMS + "lens_edges.cpp",
-          "view_.at(lens), edge)", "view_.at({}), edge)", "test_sensors", "Lens.Shows*"),
+          "images_[listed.view].at(lens)", "images_[listed.view].at({})", "test_sensors", "Lens.Shows*"),
     Fault("camera", "density through a lens x 1.1", TERMS + "lens_edges.cpp",
           "point.density = draw.probability /", "point.density = 1.1 * draw.probability /",
           "test_sensors", "Lens.Shows*"),

@@ -4,7 +4,7 @@
     tools/mitsuba/derivatives.py DIR [-o FOLDER] [--only TEXT] [--film N] [--seconds N]
         [--minutes N] [--path DIR] [-D name=value] [--at-least N]
 
-Scenes are those of census.py that limn opens, without smooth lobes (edges seen by way of these are
+Scenes: those that limn opens (census.py), without smooth lobes (edges seen by way of these are
 missing, which `check` says itself). Copies of their XML have films of N by N pixels (16) without a
 crop. In each, one parameter of each kind that `limn info` lists is checked twice: against finite
 differences, and reverse mode against forward mode. A kind is the last part of a name, with its
@@ -12,15 +12,14 @@ owner where that is a sensor or a light.
 
 A check that cannot tell is repeated with the samples that it asks for, cheapest first, as long as
 that takes at most --seconds (20) of processor time by what the last run took. Beyond that,
-TRIES parameters of the kind are tried, and the cheapest goes on. An array moves along one field
+up to three parameters of the kind are tried, and the cheapest continues. An array moves along one field
 (vertices by the same vector, texels by the same amount), or by one of its numbers.
-A reverse check tells if an error as large as the derivative would show.
+A reverse check is conclusive if an error as large as the derivative would show.
 
 Results are kept in FOLDER/results.json (out/derivatives) and a later call goes on from there; after
 a change of limn, remove it. The exit status is 1 where a check disagrees, or fewer than --at-least
-agree. Two disagreements of mitsuba-data are known: edges of a projector's frame are missing (limn
-warns), and texels of a mask that are 0 or 1 are at the ends of their range, so that differences see
-half of the slope.
+agree. Two disagreements in mitsuba-data: edges of a projector's frame are missing (limn warns), and
+the opacity of a textured mask, perhaps because texels of 0 and 1 are at the ends of their range.
 """
 
 import argparse

@@ -154,13 +154,13 @@ def markdown(rows):
         if own:
             lines.append(f"{f'`{method}`' if method else 'all methods'} {spread(own, 'sum')} (sums),"
                          f" {spread(own, 'pixel')} (pixels)")
-    text = (f"Stated errors over the spread of {SEEDS} seeds at {LEVELS[0]} to {LEVELS[-1]} samples,"
+    text = (f"Ratios of the stated error to the spread of {SEEDS} seeds at {LEVELS[0]} to {LEVELS[-1]} samples,"
             f" geometric means over {len(SCENES)} scenes: " + "; ".join(lines) + ".")
     if beyond:
         most = max(beyond, key=lambda name: sum(beyond[name]) / len(beyond[name]))
         share = 100 * sum(beyond[most]) / len(beyond[most])
         text += (f" From {ENOUGH} samples on at most {share:.1f} % of a method's sums (`{most}`) are"
-                 f" off by more than three errors; single scenes are furthest off at ")
+                 f" off by more than three errors; the most extreme ratios are ")
         text += ", ".join(f"{_number(r['sum'])} ({r['scene']}, `{r['method']}`)"
                           for r in worst_rows(rows)) + "."
     return "\n".join(textwrap.wrap(text, 100)) + "\n"
