@@ -1,9 +1,9 @@
 #pragma once
-// Edges on the film of a camera with a lens, also by way of flat mirrors. Each point of the lens has
-// silhouettes of its own, elsewhere on the film. Edges that some point of the lens may see are listed once; a sample
-// chooses an edge and a point, tests exactly whether the edge is a silhouette from there, and draws
-// from what of it is then on the film. In plant.xml 98, 96 and 89 % of the draws were on the film
-// for lenses of a radius of 1, 3 and 10 % of the distance in focus.
+// Edges on the film of a camera with a lens, also by way of flat mirrors. Each point of the lens
+// has silhouettes of its own, elsewhere on the film. Edges that some point of the lens may see are
+// listed once; a sample chooses an edge and a point, tests exactly whether the edge is a silhouette
+// from there, and draws from what of it is then on the film. In plant.xml 98, 96 and 89 % of the
+// draws were on the film for lenses of a radius of 1, 3 and 10 % of the distance in focus.
 #include "integrators/terms/film_edges.h"
 #include "limn/core/discrete_distribution.h"
 
