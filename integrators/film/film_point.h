@@ -27,8 +27,8 @@ inline FilmPoint aimed_at(FilmPoint point, const Vec3d& x) {
   point.omega = way / point.distance;
   return point;
 }
-// The ray through a film position, at rest but for that, which moves by a pixel along x in lane 0,
-// and along y in lane 1.
+// The ray through a position on the film and a point of the lens. Its derivatives are those by the
+// position alone: per pixel along x in lane 0, and along y in lane 1.
 CameraRay<Dual> shifted_ray(const Camera& camera, const FilmPlace& at);
 // To the face, as shadow rays end.
 Ray ray_to(const Scene& scene, const FilmPoint& point, FaceRef face);

@@ -140,7 +140,7 @@ void extrapolate_variances(std::span<StepTrial> trials) {
   for (size_t k = trials.size() - 1; k-- > 0;) {
     const double factor = trials[k + 1].step / trials[k].step;
     const double own = trials[k].variance, next = trials[k + 1].variance;
-    // What the smaller step did not meet are edges.
+    // Variance that only the larger step met is that of edges, and grows as 1 / h.
     trials[k].variance = own + factor * std::max(0.0, next - own);
     if (k + 2 == trials.size() || !(trials[k + 2].variance > 0)) continue;
     // Noise that is not common to the two images has a variance of 1 / h^2, and none has more.

@@ -10,7 +10,6 @@
 #include "integrators/paths/path_log.h"
 
 namespace limn {
-namespace {}  // namespace
 
 RadianceEstimator::RadianceEstimator(const Scene& scene, int threads,
                                      std::shared_ptr<const FilmRegions> visible, bool closed,

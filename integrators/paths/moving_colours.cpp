@@ -1,4 +1,4 @@
-// What scatters or sends light with derivatives.
+// Which BSDFs have derivatives, and whether the environment has.
 #include "integrators/paths/moving_colours.h"
 
 #include <algorithm>

@@ -1,5 +1,6 @@
 #pragma once
-// What scatters or sends light with derivatives.
+// Which BSDFs have derivatives by a run's parameters, and whether the environment has. All others
+// are evaluated in plain numbers.
 #include <array>
 #include <span>
 #include <vector>
@@ -13,7 +14,7 @@ class MovingColours {
  public:
   // scene: with these parameters seeded.
   MovingColours(const Scene& scene, std::span<const Parameter> parameters);
-  // Whether a side of a shape scatters with any.
+  // Whether the BSDF of a shape has derivatives on its front, or on its back.
   bool of(ShapeId shape, bool front) const { return sides_[shape.index()][front]; }
   bool of_sky() const { return sky_; }
 

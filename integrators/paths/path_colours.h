@@ -1,5 +1,6 @@
 #pragma once
-// Colours with derivatives of places without (see Unmoved). Included by path_follow.h.
+// Radiance and scattering of paths whose vertices do not move (Unmoved): positions and directions
+// are plain numbers, colours carry derivatives. Included by path_follow.h.
 #include <type_traits>
 
 #include "integrators/paths/path.h"
@@ -9,7 +10,7 @@ namespace limn {
 
 namespace detail {
 
-// Of a place that may carry derivatives, or does not.
+// A vector as S: its derivatives are dropped where S is double, and zero where it has none.
 template <class S, class Place>
 inline Vec3<S> in_scalar(const Vec3<Place>& v) {
   if constexpr (std::is_same_v<S, double>) {
@@ -34,7 +35,7 @@ inline Rgb<S> emission(const SurfacePoint<Place>& surface, const Vec3d& wi, Shad
 
 }  // namespace detail
 
-// What scatters at a vertex has derivatives there, or none.
+// Sets the vertex's scattering with derivatives, where its BSDF has any.
 template <class S, class Visitor>
 inline void PathTracer<S, Visitor>::colour(Walk& walk) const {
   if constexpr (kColoursAlone<S, Visitor>) {
@@ -66,7 +67,7 @@ inline auto PathTracer<S, Visitor>::evaluate(const Walk& walk, const Vec3d& wo,
   return coloured(walk, detail::evaluate(*walk.scattering, wo, direction, motion), wo);
 }
 
-// What the surface scatters into a direction that may move.
+// The BSDF times cosine towards wo, which may move.
 template <class S, class Visitor>
 template <class W>
 inline Rgb<S> PathTracer<S, Visitor>::scattered_into(const Walk& walk, const Vec3<W>& wo) const {
@@ -78,7 +79,7 @@ inline Rgb<S> PathTracer<S, Visitor>::scattered_into(const Walk& walk, const Vec
   }
 }
 
-// What the direction sees of the environment.
+// The environment's radiance along the path's direction, with its density [1/sr].
 template <class S, class Visitor>
 inline auto PathTracer<S, Visitor>::sight(const Walk& walk) const -> Environment::Sight<S> {
   if constexpr (kColoursAlone<S, Visitor>) {
@@ -90,7 +91,7 @@ inline auto PathTracer<S, Visitor>::sight(const Walk& walk) const -> Environment
   return c_.lights.template environment<S>(walk.lights, walk.wo, walk.sky);
 }
 
-// What the light that was drawn sends.
+// The radiance that arrives from the drawn direction of a light that is no face.
 template <class S, class Visitor>
 inline Rgb<S> PathTracer<S, Visitor>::drawn_radiance(const LightSample& light) const {
   if constexpr (kColoursAlone<S, Visitor>) {

@@ -47,9 +47,16 @@ inline bool PathTracer<S, Visitor>::hides_edges(Walk& walk, const Vec3d& wo) con
   chain.mirrors[chain.count++] = mirror;
   chain.through = through;
   const Vec3d n = walk.scattering->front() ? walk.surface.n_g : -walk.surface.n_g;
-  // The camera sees all of them, vertices see nothing refracted.
-  return (walk.was_rough && through) || (!through && !is_mirrored(n, value(walk.wi), wo)) ||
-         !mirrors->has(chain);
+  // The camera sees all of them but by way of a refracting plane that cuts its lens; vertices see
+  // nothing refracted.
+  const auto cuts_lens = [&] {
+    const Camera& camera = c_.scene.camera;
+    const double across = length(cross(n, value(camera.forward)));
+    return std::fabs(dot(n, value(walk.surface.p) - value(camera.origin))) <
+           camera.aperture_radius.v * across;
+  };
+  return (through && (walk.was_rough || cuts_lens())) ||
+         (!through && !is_mirrored(n, value(walk.wi), wo)) || !mirrors->has(chain);
 }
 
 // Along the smooth ray that was chosen; false where the path ends. Its direction moves with the

@@ -8,7 +8,7 @@
 
 namespace limn {
 
-// Whether any material is worth lanes (PathTracer::work_wide).
+// Whether a BSDF has a GGX lobe, which eight lanes evaluate faster (PathTracer::work_wide).
 bool is_glossy(const Scene& scene);
 
 // Which light and which share of the directions paths draw, and how they end, as a scene has it

@@ -54,8 +54,8 @@ struct FilmView {
       return mirrors->of(face) == last_mirror();
     });
   }
-  // Cuts the segment from a to b to what lies before the last mirror. origin: of
-  // the image, or the point of its lens.
+  // Cuts the segment from a to b to what lies before the last mirror. origin: of the image, or the
+  // point of its lens.
   bool clip_to_mirror(const Vec3d& origin, const Vec3d& a, const Vec3d& b, double& t0,
                       double& t1) const;
 };

@@ -140,6 +140,18 @@ TEST(FlatGlass, ShowsEdgesToTheCameraAlone) {
   EXPECT_TRUE(result.gradient.incomplete);
 }
 
+// Points of a lens on both sides of a refracting plane see edges by way of it from either side.
+TEST(FlatGlass, MustNotCutTheLens) {
+  const TempFiles files;
+  for (const auto& [radius, incomplete] : {std::pair(0.1, false), std::pair(20.0, true)}) {
+    Scene scene = behind_slab(files);
+    scene.camera.aperture_radius = radius;
+    scene.camera.focus_distance = 3;
+    const CheckResult result = run_check(scene, "ball.translate.x", 32);
+    EXPECT_EQ(result.gradient.incomplete, incomplete) << radius;
+  }
+}
+
 // Chains of three mirrors are left, and what curved ones show.
 TEST(FlatMirrors, WhatIsMissingIsTold) {
   const TempFiles files;
