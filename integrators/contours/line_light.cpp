@@ -263,7 +263,8 @@ template <class V, class Piece>
 V LineLight::sum_over_lines(const ContourPoint& at, const Pencil& pencil,
                             std::span<const Vec3d> planes, int w, const V* all, LineChoice choice,
                             const Piece& piece) const {
-  auto [count, offset] = choice;
+  int count = choice.count;
+  double offset = choice.offset;
   Scratch& own = scratch();
   Isolines& lines = own.isolines;
   const bool open = !all || w != 0;

@@ -264,7 +264,7 @@ struct Directions {
 template <class Eval, class Add>
 void along_each(const Bsdf& bsdf, const SeededCopies<Bsdf>* copies, const Directions& directions,
                 const TexturesAt<Var>& textures, const Eval& eval, const Add& add) {
-  const auto& [n, wi, wo] = directions;
+  const Vec3<Var>&n = directions.n, &wi = directions.wi, &wo = directions.wo;
   Rgb<Dual> at[kMostTextures];
   for (int k = 0; k < textures.count(); ++k) at[k] = held_colour(textures.held()[k]);
   if (!is_constant(n)) add(n, eval(bsdf, along_axes(n), held(wi), held(wo), at));
