@@ -47,8 +47,8 @@ TEST(Normaliser, IsWhereTheLinearProgramHasOne) {
     }
     ++(found.norm() > 0 ? some : none);
   }
-  EXPECT_GT(some, 300);
-  EXPECT_GT(none, 300);
+  EXPECT_GT(some, 200);  // about 1700 and 300: the order of draws differs between compilers
+  EXPECT_GT(none, 200);
 }
 
 // A polynomial and a plane in one lane; the others hold copies.
