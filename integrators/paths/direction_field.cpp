@@ -93,7 +93,7 @@ double MotionRates::sliding(const Vec3<Lanes>& velocity) const {
   return speed_ > 0 ? speed / speed_ : 0;
 }
 
-double MotionRates::urgency(const Vec3d& p, const Vec3<Lanes>& velocity, const Vec3d& p0) const {
+double MotionRates::splitting(const Vec3d& p, const Vec3<Lanes>& velocity, const Vec3d& p0) const {
   const double typical = at(p0);
   if (!(typical > 0)) return 1;
   return at(p) / typical + std::max(0.0, sliding(velocity) - 1);

@@ -82,7 +82,7 @@ class MotionRates {
   // grazing angle, it slides faster than any object.
   double sliding(const Vec3<Lanes>& velocity) const;
   // How much an edge seen from p, which moves so, may add against one seen from a point p0 at rest.
-  double urgency(const Vec3d& p, const Vec3<Lanes>& velocity, const Vec3d& p0) const;
+  double splitting(const Vec3d& p, const Vec3<Lanes>& velocity, const Vec3d& p0) const;
   // Nothing moves: turning would only add noise.
   bool still() const { return sources_.empty(); }
   bool moves_camera() const {

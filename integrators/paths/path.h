@@ -5,10 +5,6 @@
 // directions that move on purpose (direction_field.h, warp_field.h), the one direction of a light
 // without extent and the rays of smooth lobes, which follow the parameters. No light is drawn for
 // what smooth lobes see: there an emitter counts fully where a path meets it.
-//
-// Paths are followed side by side where there are several: each waits for its own divisions, roots
-// and reads, and a processor fills such gaps with the work of the next. A path's own steps, and so
-// its bits, do not depend on what goes beside it.
 #include <cstdint>
 #include <span>
 #include <type_traits>
@@ -39,32 +35,26 @@ class PathTracer {
   using Walk = limn::Walk<S, Visitor>;
   using Place = PlaceScalar<S, Visitor>;
   static constexpr bool kPlain = std::is_same_v<Place, double>;
-  // Side by side. With derivatives 1, 3 and 8 took 1.05, 1.02 and 1.01 of the time that a gradient
-  // of the demo had taken path by path. Images with 32 and 64 took 0.97 to 0.98 of the time with
-  // 16: fewer lanes stay empty as paths end.
+  // Side by side, see path_follow.h.
   static constexpr size_t kMostWalks = kPlain ? 64 : 8;
 
   PathTracer(const PathContext& context, RayCount& rays) : c_(context), rays_(rays) {}
 
-  // By the fields of paths that have one. Must outlive the tracer. Only where places carry
-  // derivatives.
+  // By the fields of paths that have one. Must outlive the tracer. For places with derivatives.
   void move_directions(const MotionRates& rates) {
     static_assert(std::is_same_v<Place, Dual>);
     rates_ = &rates;
   }
-  // The directions of all vertices move from now on, on one path at a time. Must outlive the
-  // tracer.
+  // The directions of all vertices move, on one path at a time. Must outlive the tracer.
   void warp_directions(DirectionWarper& warper) {
     static_assert(std::is_same_v<Place, Dual>);
     warper_ = &warper;
   }
-  // Takes more light samples and directions at vertices that slide fast. It must outlive the
-  // tracer.
+  // Takes more light samples and directions at vertices that slide fast. Must outlive the tracer.
   void split_by(const MotionRates* rates) { splitting_ = rates; }
-  // Many paths are followed, hardly ever one or two: their steps are taken in eight lanes. What a
-  // path comes to differs from the other way in rounding.
-  // Scattering functions only where `glossy`: of diffuse ones alone images took 1.01 to 1.05 of the
-  // time.
+  // Many paths are followed, hardly ever one or two: their steps are taken in eight lanes, which
+  // changes rounding. Scattering functions only where `glossy`: of diffuse ones alone images took
+  // 1.01 to 1.05 of the time.
   void work_wide(bool glossy) {
     static_assert(kPlain);
     wide_ = true;
@@ -87,14 +77,7 @@ class PathTracer {
   Rgb<S> escaped(const Vec3<Place>& direction, int bounces) const;
 
   // A path that starts on a surface: the radiance that leaves it along wi, emission and everything
-  // scattered within the scene's depth. With x_0 the surface, w_i a direction drawn at x_i with
-  // density p_i, f_i the scattering function times cosine there, and the throughput T_k = f_0 / p_0
-  // ... f_(k-1) / p_(k-1), one path estimates
-  //   L = L_e(x_0) + sum over k of T_k (E_k + f_k / p_k m_k L_e(x_(k+1))),
-  //   E_k = f_k(l) / q_k(l) n_k L_e(l),
-  // l a direction that light sampling draws with density q_k, and m_k = p^2 / (p^2 + q^2) and
-  // n_k = q^2 / (p^2 + q^2) the weights of the power heuristic at either's direction (n_k = 1 for a
-  // delta light). w, l, p, q, m, n are constants when S carries derivatives.
+  // scattered within the scene's depth, by the estimate of path_follow.h.
   void place(Walk& walk, const SurfacePoint<Place>& surface, const Vec3<Place>& wi) const;
   void follow_one(Walk& walk) {
     Walk* const one = &walk;
@@ -142,19 +125,20 @@ class PathTracer {
   bool choose_direction(Walk& walk);
   bool scatter(Walk& walk);
   bool scatter(Walk& walk, const Evaluation& evaluation);
-  void escape(std::span<Walk* const> walks) const;
-  void escape(Walk& walk) const;
-  Environment::Sight<S> sight(const Walk& walk) const;
-  bool arrive(Walk& walk);
   void set_motion(Walk& walk) const;
   int splits(const SurfacePoint<Place>& surface, int copies) const;
-  Rgb<S> emitted(const Walk& walk) const;
-  double unmoved_albedo(const Walk& walk) const;
-  bool survives_roulette(Walk& walk) const;
   // The density of the next direction at w, of which scattering alone has this one.
   double density(const Walk& walk, const Vec3d& w, double scattered) const {
     return c_.mirrored ? MirroredLight::pdf(walk.mixture, w, scattered) : scattered;
   }
+  // path_arrive.h
+  void escape(std::span<Walk* const> walks) const;
+  void escape(Walk& walk) const;
+  Environment::Sight<S> sight(const Walk& walk) const;
+  bool arrive(Walk& walk);
+  Rgb<S> emitted(const Walk& walk) const;
+  double unmoved_albedo(const Walk& walk) const;
+  bool survives_roulette(Walk& walk) const;
   // path_smooth.h
   bool turns_smoothly(Walk& walk) const;
   bool turn_smoothly(Walk& walk) const;
@@ -187,19 +171,19 @@ class PathTracer {
   void draw_light(Walk& walk, const Rng& key) const;
   void shine(std::span<Walk* const> walks);
   size_t weigh_lights(std::span<Walk* const> walks, Walk** lit) const;
+  void add_light(Walk& walk) const;
+  void add_lights(Walk& walk, int count);
+  Rgb<S> direct_light(Walk& walk, const Rng& key);
+  // path_light_value.h
   void weigh_light(Walk& walk) const;
   bool weigh_light(Walk& walk, const Evaluation& evaluation) const;
   void draw_delta(Walk& walk, const DeltaLight& delta) const;
   Rgb<S> light_value(const Walk& walk) const;
   Rgb<S> drawn_radiance(const LightSample& light) const;
   Rgb<S> emitted(const Walk& walk, const DirectionMotion* motion) const;
-  void add_light(Walk& walk) const;
-  void add_lights(Walk& walk, int count);
-  Rgb<S> direct_light(Walk& walk, const Rng& key);
   Rgb<S> warped_light(const Walk& walk, const Rng& key);
 
-  // With 64, squared error times rays was 1.5 times as large under a moving camera, and the same
-  // elsewhere.
+  // 64 multiplied squared error times rays by 1.5 under a moving camera, by 1 elsewhere.
   static constexpr int kMostSplits = 16;
   static constexpr int kMostPaths = 64;  // of a sample, see allocation.cpp
   const PathContext& c_;

@@ -1,10 +1,27 @@
 #pragma once
 // The path tracer's paths, side by side: from rays or surfaces to their ends. Included by each .cpp
 // that follows paths; it brings all that path.h declares.
+//
+// With x_0 the surface where a path starts, w_i a direction drawn at x_i with density p_i, f_i the
+// scattering function times cosine there, and the throughput T_k = f_0 / p_0 ... f_(k-1) / p_(k-1),
+// one path estimates
+//   L = L_e(x_0) + sum over k of T_k (E_k + f_k / p_k m_k L_e(x_(k+1))),
+//   E_k = f_k(l) / q_k(l) n_k L_e(l),
+// l a direction that light sampling draws with density q_k, and m_k = p^2 / (p^2 + q^2) and
+// n_k = q^2 / (p^2 + q^2) the weights of the power heuristic at either's direction (n_k = 1 for a
+// delta light). w, l, p, q, m, n are constants when S carries derivatives.
+//
+// Paths are followed side by side where there are several: each waits for its own divisions, roots
+// and reads, and a processor fills such gaps with the work of the next. A path's own steps, and so
+// its bits, do not depend on what goes beside it. With derivatives 1, 3 and 8 side by side took
+// 1.05, 1.02 and 1.01 of the time that a gradient of the demo had taken path by path. Images with
+// 32 and 64 took 0.97 to 0.98 of the time with 16: fewer lanes stay empty as paths end.
 #include <algorithm>
 
 #include "integrators/paths/path.h"
+#include "integrators/paths/path_arrive.h"
 #include "integrators/paths/path_colours.h"
+#include "integrators/paths/path_light_value.h"
 #include "integrators/paths/path_lights.h"
 #include "integrators/paths/path_rays.h"
 #include "integrators/paths/path_smooth.h"

@@ -223,7 +223,7 @@ class TermEstimator::VertexTerms {
     const Vec3d p = value(surface.p);
     if (bounces == 0) first_ = p;
     const Vec3<Lanes> velocity{surface.p.x.d, surface.p.y.d, surface.p.z.d};
-    const double factor = luminance(throughput) * estimator_.rates_.urgency(p, velocity, first_);
+    const double factor = luminance(throughput) * estimator_.rates_.splitting(p, velocity, first_);
     return factor < kMost ? std::max(factor, kLeast) : kMost;  // also of what is not a number
   }
   // A whole number with this mean.

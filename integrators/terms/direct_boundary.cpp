@@ -63,11 +63,11 @@ void DirectTerm::add_at_vertex(const PathVertex& vertex, int samples, BoundarySi
   }
   direct_.draw(pieces, vertex.key, vertex.bounces, samples, sink.cost(), points);
   for (const DirectPoint& point : points) {
-    const double share = is_lifted(context_.scene, vertex.surface.face.shape)
-                             ? 1
-                             : direct_share(context_.scene, edges_, regions_, emitter_edges_,
-                                            point.sample, point.region, vertex.surface.p,
-                                            vertex.surface.n_g, vertex.step, vertex.bounces);
+    const double share =
+        is_lifted(context_.scene, vertex.surface.face.shape)
+            ? 1
+            : direct_share({context_.scene, edges_, regions_, emitter_edges_}, point.sample,
+                           point.region, vertex.surface, vertex.step, vertex.bounces);
     const EdgeDraw draw{edges_.object(point.sample.edge.object),
                         point.sample,
                         {&regions_, point.region},

@@ -152,9 +152,9 @@ double EmitterEdges::probability(size_t k, EdgeRef edge) const {
   return listed_[block.before + std::popcount(block.listed & (bit - 1))].probability;
 }
 
-PenumbraShare penumbra_share(const Scene& scene, const EdgeSamplerInput& edges,
-                             const LightRegions& regions, const EmitterEdges& emitter_edges,
-                             const EmitterLine& line, const PathStep& step, int bounces) {
+PenumbraShare penumbra_share(const EmitterWays& ways, const EmitterLine& line, const PathStep& step,
+                             int bounces) {
+  const auto& [scene, edges, regions, emitter_edges] = ways;
   if (bounces > 0 && !(step.pdf > 0)) return {};
   const double probability = emitter_edges.probability(line.region, line.edge);
   const Vec3d through = line.e - line.p;
@@ -189,14 +189,13 @@ PenumbraShare penumbra_share(const Scene& scene, const EdgeSamplerInput& edges,
   return result;
 }
 
-double direct_share(const Scene& scene, const EdgeSamplerInput& edges, const LightRegions& regions,
-                    const EmitterEdges& emitter_edges, const EdgeSample& sample, size_t k,
-                    const Vec3d& p, const Vec3d& n, const PathStep& step, int bounces) {
-  const EdgeMesh& mesh = edges.object(sample.edge.object);
+double direct_share(const EmitterWays& ways, const EdgeSample& sample, size_t k,
+                    const SurfacePoint<double>& at, const PathStep& step, int bounces) {
+  const EdgeMesh& mesh = ways.edges.object(sample.edge.object);
   const auto& ends = mesh.edge(sample.edge.edge).vertices;
   const Vec3d e = mesh.position(ends[0]) * (1 - sample.t) + mesh.position(ends[1]) * sample.t;
-  const EmitterLine line{k, sample.edge, e, p, n};
-  return 1 - penumbra_share(scene, edges, regions, emitter_edges, line, step, bounces).share;
+  const EmitterLine line{k, sample.edge, e, at.p, at.n_g};
+  return 1 - penumbra_share(ways, line, step, bounces).share;
 }
 
 }  // namespace limn

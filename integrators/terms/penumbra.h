@@ -85,18 +85,24 @@ struct EmitterLine {
   Vec3d e, p, n;
 };
 
+// What both ways to points on the edges before emitters are drawn from.
+struct EmitterWays {
+  const Scene& scene;
+  const EdgeSamplerInput& edges;
+  const LightRegions& regions;
+  const EmitterEdges& emitter_edges;
+};
+
 struct PenumbraShare {
   double density = 0;  // of p as seen from the vertex before [1/sr], if lines through e are drawn
   double share = 0;    // of `penumbra`; the rest is that of `direct`
 };
 // step: how a path came to p, after how many bounces: by the density of directions, or of positions
 // in a pixel if it comes from the camera.
-PenumbraShare penumbra_share(const Scene& scene, const EdgeSamplerInput& edges,
-                             const LightRegions& regions, const EmitterEdges& emitter_edges,
-                             const EmitterLine& line, const PathStep& step, int bounces);
+PenumbraShare penumbra_share(const EmitterWays& ways, const EmitterLine& line, const PathStep& step,
+                             int bounces);
 // The share of `direct` in what a point of an edge before region k adds at a vertex.
-double direct_share(const Scene& scene, const EdgeSamplerInput& edges, const LightRegions& regions,
-                    const EmitterEdges& emitter_edges, const EdgeSample& sample, size_t k,
-                    const Vec3d& p, const Vec3d& n, const PathStep& step, int bounces);
+double direct_share(const EmitterWays& ways, const EdgeSample& sample, size_t k,
+                    const SurfacePoint<double>& at, const PathStep& step, int bounces);
 
 }  // namespace limn

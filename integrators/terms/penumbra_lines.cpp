@@ -36,7 +36,7 @@ std::optional<DrawnLine> PenumbraLines::draw(double u, Rng& rng, RayCount& rays)
 bool PenumbraLines::complete(DrawnLine& drawn, const PathStep& step, int bounces, Rng& rng) const {
   constexpr double kLeastShare = 0.1;  // lines of less go on by roulette; not tuned
   const auto [density, share] =
-      penumbra_share(context_.scene, edges_, regions_, emitter_edges_, drawn.line, step, bounces);
+      penumbra_share({context_.scene, edges_, regions_, emitter_edges_}, drawn.line, step, bounces);
   if (!(rng.uniform() * kLeastShare < share)) return false;
   drawn.edge.probability *= density / std::max(share, kLeastShare);
   return true;

@@ -193,7 +193,7 @@ std::vector<bool> changed_terms(std::span<const TermType* const> types,
                                 const std::vector<bool>& computed, const Moved& moved);
 // The row that is on the film alone.
 const TermType& film_term();
-// Sums of all terms are kept on the stack.
-inline constexpr size_t kMostTerms = 7;
+// Sums of all terms are kept on the stack: room for them, and for one more.
+inline constexpr size_t kMostTerms = 8;
 
 }  // namespace limn

@@ -1,6 +1,7 @@
 // A smooth conductor: a mirror.
 #include <fmt/format.h>
 
+#include "limn/core/make_bsdf.h"
 #include "src/bsdf/both_scalars.h"
 #include "src/bsdf/fresnel.h"
 #include "src/bsdf/indices.h"

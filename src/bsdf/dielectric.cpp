@@ -1,4 +1,5 @@
 // A smooth border between two media without absorption: glass, water.
+#include "limn/core/make_bsdf.h"
 #include "src/bsdf/smooth_border.h"
 
 namespace limn {

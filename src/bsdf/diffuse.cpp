@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "limn/core/make_bsdf.h"
 #include "src/bsdf/both_scalars.h"
 #include "src/bsdf/cosine.h"
 #include "src/bsdf/types.h"

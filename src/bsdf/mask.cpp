@@ -1,5 +1,6 @@
 // A surface that lets some of the light pass straight on: opacity times another BSDF. With opacity
 // 0 it is not seen at all (`null`), but ends shadow rays, as in Mitsuba's path tracer.
+#include "limn/core/make_bsdf.h"
 #include "src/bsdf/both_scalars.h"
 #include "src/bsdf/nested.h"
 

@@ -6,6 +6,7 @@
 #include <type_traits>
 
 #include "limn/core/bsdf.h"
+#include "limn/core/make_bsdf.h"
 #include "limn/core/properties.h"
 #include "src/bsdf/microfacet.h"
 #include "src/bsdf/tangent_frame.h"

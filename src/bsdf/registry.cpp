@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "limn/core/make_bsdf.h"
 #include "limn/core/names.h"
 #include "src/bsdf/types.h"
 

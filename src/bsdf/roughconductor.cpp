@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "limn/core/make_bsdf.h"
 #include "limn/core/names.h"
 #include "src/bsdf/both_scalars.h"
 #include "src/bsdf/indices.h"

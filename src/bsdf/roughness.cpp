@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "limn/core/make_bsdf.h"
 #include "limn/core/names.h"
 #include "src/bsdf/microfacet_reflection.h"
 #include "src/bsdf/types.h"

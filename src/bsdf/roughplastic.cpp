@@ -6,6 +6,7 @@
 
 #include <algorithm>
 
+#include "limn/core/make_bsdf.h"
 #include "src/bsdf/both_scalars.h"
 #include "src/bsdf/cosine.h"
 #include "src/bsdf/fresnel.h"

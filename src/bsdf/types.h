@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "limn/core/bsdf.h"
+#include "limn/core/make_bsdf.h"
 #include "limn/core/properties.h"
 
 namespace limn {

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "limn/core/face_overlaps.h"
+#include "limn/core/make_bsdf.h"
 #include "limn/core/memory.h"
 #include "limn/core/mesh_attribute.h"
 #include "limn/core/names.h"

@@ -27,7 +27,7 @@ FAULTS = [
     Fault("interior", "score of a moving direction lost", "integrators/paths/path_vertices.h",
           "  detail::add_score<Place>(walk, value(walk.throughput) * (1 / pdf));\n", "",
           "test_moving_directions", "MovingDirections.TakeOut*", PATHS),
-    Fault("interior", "throughput not divided by survival", "integrators/paths/path_vertices.h",
+    Fault("interior", "throughput not divided by survival", "integrators/paths/path_arrive.h",
           "  walk.throughput = walk.throughput * (1 / survival);\n", "",
           "test_furnace", "*", PATHS),
 

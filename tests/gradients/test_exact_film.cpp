@@ -16,6 +16,7 @@
 #include "limn/integrators/compare_images.h"
 #include "limn/integrators/gradient.h"
 #include "limn/integrators/render.h"
+#include "support/brute_force_tracer.h"
 #include "support/compare_moments.h"
 #include "support/meshes.h"
 #include "support/scenes.h"

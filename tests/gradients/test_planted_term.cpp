@@ -1,5 +1,5 @@
-// "A term: 3 files" of CONTRIBUTING.md. In this program's table of terms the row of `filter` is
-// that of support/planted_term.cpp; all else is linked as it is. The term must work in both modes.
+// "A term: 3 files" of CONTRIBUTING.md. This program's table of terms has one row more, that of
+// support/planted_term.cpp; all else is linked as it is. The term must work in both modes.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -11,6 +11,7 @@
 #include "limn/integrators/gradient.h"
 #include "support/check_runs.h"
 #include "support/chi_square.h"
+#include "support/edge_mesh_fault.h"
 #include "support/forest_fault.h"
 #include "support/meshes.h"
 #include "support/same_mean.h"
@@ -169,7 +170,7 @@ TEST(TextureEdges, AreEdges) {
   for (const bool black_behind : {true, false}) {
     const EdgeSamplerInput input = textured_input(torus_mesh(9, 6), black_behind);
     const EdgeMesh& edges = input.objects[1];
-    EXPECT_EQ(edges.validate(), "");
+    EXPECT_EQ(fault_of(edges), "");
     EXPECT_EQ(edges.count(EdgeClass::kTexture), edges.edges.size());
     EXPECT_EQ(fault_of(build_forest(input, 2, {}), input.objects), "");
     Rng rng(3, 0, 0);
@@ -186,10 +187,10 @@ TEST(TextureEdges, AreEdges) {
     EXPECT_LT(seen, edges.edges.size());
     EdgeMesh broken = edges;
     broken.incidences[3].through = false;
-    EXPECT_EQ(broken.validate(), "edge 3: its face ends there");
+    EXPECT_EQ(fault_of(broken), "edge 3: its face ends there");
     broken = edges;
     broken.places.pop_back();
-    EXPECT_EQ(broken.validate(), "edge 0: there are other than V places");
+    EXPECT_EQ(fault_of(broken), "edge 0: there are other than V places");
   }
 }
 

@@ -12,6 +12,7 @@
 #include "edgetree/lobe/ltc.h"
 #include "edgetree/lobe/ltc_table.h"
 #include "limn/core/bsdf.h"
+#include "limn/core/make_bsdf.h"
 #include "limn/core/rng.h"
 
 namespace limn {

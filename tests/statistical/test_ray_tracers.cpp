@@ -8,6 +8,7 @@
 #include <fstream>
 
 #include "limn/core/shading.h"
+#include "support/brute_force_tracer.h"
 #include "support/meshes.h"
 #include "support/scenes.h"
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 
+#include "limn/core/make_bsdf.h"
 #include "limn/core/rng.h"
 #include "support/bsdf_cases.h"
 #include "support/chi_square.h"

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "limn/core/bsdf.h"
+#include "limn/core/make_bsdf.h"
 #include "support/held_textures.h"
 #include "support/test_properties.h"
 

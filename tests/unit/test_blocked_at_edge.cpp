@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "integrators/paths/path.h"
+#include "support/brute_force_tracer.h"
 #include "support/meshes.h"
 #include "support/scenes.h"
 

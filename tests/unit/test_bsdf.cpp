@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "limn/core/error.h"
+#include "limn/core/make_bsdf.h"
 #include "limn/core/rng.h"
 #include "support/bsdf_cases.h"
 #include "support/held_textures.h"

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "limn/core/bsdf.h"
+#include "limn/core/make_bsdf.h"
 #include "limn/core/rng.h"
 #include "support/running_mean.h"
 #include "support/test_properties.h"

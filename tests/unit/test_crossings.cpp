@@ -8,6 +8,7 @@
 
 #include "edgetree/forest/forest_build.h"
 #include "limn/edgetree/crossing_curves.h"
+#include "support/edge_mesh_fault.h"
 #include "support/forest_fault.h"
 #include "support/meshes.h"
 
@@ -236,7 +237,7 @@ TEST(Crossings, AreEdges) {
   for (Mesh& mesh : meshes) set_test_tangents(mesh);
   const Segments segments = found(meshes);
   const EdgeMesh edges = intersection_edges(pointers(meshes), segments);
-  EXPECT_EQ(edges.validate(), "");
+  EXPECT_EQ(fault_of(edges), "");
   ASSERT_EQ(edges.count(EdgeClass::kIntersection), segments.size());
   for (size_t i = 0; i < segments.size(); ++i) {
     const auto faces = edges.faces_around(EdgeId(static_cast<uint32_t>(i)));
@@ -247,13 +248,13 @@ TEST(Crossings, AreEdges) {
   EXPECT_EQ(fault_of(build_forest(input, 2, {}), input.objects), "");
   EdgeMesh broken = edges;
   broken.incidences[3].through = false;
-  EXPECT_EQ(broken.validate(), "edge 1: a face that crosses ends there");
+  EXPECT_EQ(fault_of(broken), "edge 1: a face that crosses ends there");
   broken = edges;
   broken.incident_faces[4].shape = ShapeId::none();
-  EXPECT_EQ(broken.validate(), "edge 2: a face that crosses is of no shape");
+  EXPECT_EQ(fault_of(broken), "edge 2: a face that crosses is of no shape");
   broken = edges;
   broken.shape = ShapeId(7);
-  EXPECT_EQ(broken.validate(), "edge 0: a mesh has an edge where faces cross");
+  EXPECT_EQ(fault_of(broken), "edge 0: a mesh has an edge where faces cross");
 }
 
 // Every plane's own speed is found on the line, which does not move along itself; and the line is

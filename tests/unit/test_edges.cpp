@@ -9,6 +9,7 @@
 #include <tuple>
 
 #include "../support/meshes.h"
+#include "support/edge_mesh_fault.h"
 
 namespace limn {
 namespace {
@@ -332,8 +333,8 @@ TEST(Edges, SharpEdgesNeedAFaceInFront) {
 TEST(EdgeMesh, IsValidForAllMeshes) {
   for (const auto& [name, mesh] : test_meshes())
     for (const bool black_behind : {false, true})
-      EXPECT_EQ(build_edge_mesh(mesh, black_behind).validate(), "") << name;
-  EXPECT_EQ(EdgeMesh(build_edge_mesh(make_mesh({}, {}), true)).validate(), "");
+      EXPECT_EQ(fault_of(build_edge_mesh(mesh, black_behind)), "") << name;
+  EXPECT_EQ(fault_of(EdgeMesh(build_edge_mesh(make_mesh({}, {}), true))), "");
 }
 
 // Each change breaks one thing that validate names.
@@ -393,11 +394,11 @@ TEST(EdgeMesh, CorruptedCopiesAreFound) {
   Mesh mesh = icosphere_mesh(1);
   set_test_tangents(mesh);
   const EdgeMesh whole = build_edge_mesh(mesh, true);
-  ASSERT_EQ(whole.validate(), "");
+  ASSERT_EQ(fault_of(whole), "");
   for (const auto& [fault, change] : changes) {
     EdgeMesh copy = whole;
     change(copy);
-    EXPECT_EQ(copy.validate(), fault);
+    EXPECT_EQ(fault_of(copy), fault);
   }
 }
 

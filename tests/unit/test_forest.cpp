@@ -16,6 +16,7 @@
 #include "edgetree/forest/forest_build.h"
 #include "edgetree/forest/forest_query.h"
 #include "limn/edgetree/contribution_bound.h"
+#include "support/edge_mesh_fault.h"
 
 namespace limn {
 namespace {
@@ -232,7 +233,7 @@ TEST(Forest, IsValidForAllMeshes) {
     const Mesh other = transformed(mesh, rows, 1e-3, {1e3, -1, 2});
     const EdgeSamplerInput input{
         {build_edge_mesh(mesh, true), build_edge_mesh(other, false, ShapeId(1))}};
-    for (const EdgeMesh& object : input.objects) EXPECT_EQ(object.validate(), "") << name;
+    for (const EdgeMesh& object : input.objects) EXPECT_EQ(fault_of(object), "") << name;
     for (const uint32_t width : {2u, 5u, 8u}) {
       const Forest forest = build_forest(input, 2, ForestConfig{.width = width});
       EXPECT_EQ(fault_of(forest, input.objects), "") << name;

@@ -6,6 +6,8 @@
 #include <cmath>
 
 #include "limn/edgetree/touching.h"
+#include "support/brute_force_tracer.h"
+#include "support/edge_mesh_fault.h"
 #include "support/meshes.h"
 
 namespace limn {
@@ -40,7 +42,7 @@ United united(const Scene& scene, const Vec3d& viewer) {
     objects.push_back(build_edge_mesh(*meshes[s], false, ShapeId(s)));
   }
   unite_touching_edges(shapes, find_face_pairs(meshes, viewer, 1), viewer, 1, objects);
-  for (const EdgeMesh& object : objects) EXPECT_EQ(object.validate(), "");
+  for (const EdgeMesh& object : objects) EXPECT_EQ(fault_of(object), "");
   United result{objects[0], EdgeId(0)};
   while (result.mesh.position(result.mesh.edge(result.edge).vertices[0]).z != 0 ||
          result.mesh.position(result.mesh.edge(result.edge).vertices[1]).z != 0)

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "../support/meshes.h"
+#include "limn/core/make_bsdf.h"
 #include "tools/limn/reject/canvas.h"
 #include "tools/limn/reject/mesh_view.h"
 

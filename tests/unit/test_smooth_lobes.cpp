@@ -3,6 +3,7 @@
 
 #include <functional>
 
+#include "limn/core/make_bsdf.h"
 #include "support/bsdf_cases.h"
 #include "support/test_properties.h"
 

@@ -1,6 +1,7 @@
 // Reverse-mode scalars, surface points and shading normals against dual numbers.
 #include <gtest/gtest.h>
 
+#include "limn/core/make_bsdf.h"
 #include "limn/core/normals_adjoint.h"
 #include "limn/core/reverse.h"
 #include "limn/core/rng.h"

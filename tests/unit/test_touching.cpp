@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "limn/core/face_overlaps.h"
+#include "support/edge_mesh_fault.h"
 #include "support/meshes.h"
 
 namespace limn {
@@ -35,7 +36,7 @@ std::vector<EdgeMesh> united(const std::vector<Mesh>& meshes,
     pointers.push_back(&meshes[i]);
   }
   unite_touching_edges(shapes, find_face_pairs(pointers, {0, 0, 0}, 2), {0, 0, 0}, 2, objects);
-  for (const EdgeMesh& object : objects) EXPECT_EQ(object.validate(), "");
+  for (const EdgeMesh& object : objects) EXPECT_EQ(fault_of(object), "");
   return objects;
 }
 
@@ -271,7 +272,7 @@ TEST(Touching, SeamsThatWereRoundedApartAreWelded) {
     weld_seams(mesh);
     EXPECT_EQ(build_edge_mesh(mesh, true).count(EdgeClass::kSharp), 6u);
     EXPECT_TRUE(build_edge_mesh(mesh, true).one_sided_closed);
-    EXPECT_EQ(build_edge_mesh(mesh, true).validate(), "");
+    EXPECT_EQ(fault_of(build_edge_mesh(mesh, true)), "");
   }
 }
 

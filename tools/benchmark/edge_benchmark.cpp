@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "limn/core/error.h"
+#include "limn/core/make_bsdf.h"
 #include "limn/core/mesh.h"
 #include "limn/core/names.h"
 #include "limn/core/parallel.h"

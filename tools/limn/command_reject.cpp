@@ -1,5 +1,6 @@
 // limn reject: measures what samplers reject, draws it, writes pictures and figures.
 #include "tools/limn/command_reject.h"
+#include "limn/core/make_bsdf.h"
 
 #include "tools/limn/commands.h"
 #include "tools/limn/report_script.h"

@@ -46,6 +46,20 @@ CLI::Validator within(long double least, long double most) {
   return within(Option{"", "", least, most});
 }
 
+template <class T>
+void OptionAdder::operator()(T& value, const Option& option) const {
+  CLI::Option* added = app_.add_option(option_name(option.name), value, help_of(option));
+  added->check(within(option));
+  if (std::same_as<T, std::vector<int64_t>>) added->delimiter(',');
+  if (option.type) added->type_name(option.type);
+  if (std::is_arithmetic_v<T> && !option.unset) added->capture_default_str();
+}
+template void OptionAdder::operator()(int&, const Option&) const;
+template void OptionAdder::operator()(double&, const Option&) const;
+template void OptionAdder::operator()(std::optional<int>&, const Option&) const;
+template void OptionAdder::operator()(std::optional<uint64_t>&, const Option&) const;
+template void OptionAdder::operator()(std::vector<int64_t>&, const Option&) const;
+
 void OptionAdder::operator()(std::vector<std::string>& terms, const Option& option) const {
   const std::string known = option.task == Task::kGradient
                                 ? "among " + join(Method(option.task)->terms)

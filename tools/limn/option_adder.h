@@ -24,14 +24,9 @@ class OptionAdder {
  public:
   explicit OptionAdder(CLI::App& app) : app_(app) {}
 
-  template <class T>  // numbers
-  void operator()(T& value, const Option& option) const {
-    CLI::Option* added = app_.add_option(option_name(option.name), value, help_of(option));
-    added->check(within(option));
-    if (std::same_as<T, std::vector<int64_t>>) added->delimiter(',');
-    if (option.type) added->type_name(option.type);
-    if (std::is_arithmetic_v<T> && !option.unset) added->capture_default_str();
-  }
+  // Numbers, of the types that option_adder.cpp lists: CLI11 takes long to compile.
+  template <class T>
+  void operator()(T& value, const Option& option) const;
   void operator()(std::vector<std::string>& terms, const Option& option) const;
   void operator()(Method& method, const Option& option) const;
   template <Choice T>

@@ -16,54 +16,13 @@
 #include <string>
 #include <vector>
 
-#include "limn/core/dual.h"
+#include "limn/core/bsdf_value.h"
 #include "limn/core/lobe.h"
 #include "limn/core/parameter_ref.h"
 #include "limn/core/smooth_ray.h"
 #include "limn/core/texture.h"
-#include "limn/core/vec.h"
 
 namespace limn {
-
-class Properties;
-
-// At most so many textures of one BSDF.
-inline constexpr int kMostTextures = 12;
-
-// A colour of a BSDF. The BSDF asks for its value and does not know whether that is a constant,
-// which derivatives take, or a texture's.
-struct BsdfColour {
-  Rgb<Dual> constant;  // of a texture: its mean
-  double most = 1;     // of a texture: its largest value
-  int texture = -1;    // where its value stands in `at`; -1: it is constant
-
-  // at: see Bsdf; null: the mean.
-  template <class S>
-  Rgb<S> of(const Rgb<S>* at) const {
-    return at && texture >= 0 ? at[texture] : as<S>(constant);
-  }
-  // Upper bound of its channels.
-  double bound(const Rgb<double>* at = nullptr) const {
-    return texture >= 0 && !at ? most : max_channel(of<double>(at));
-  }
-};
-
-// The same of a number.
-struct BsdfNumber {
-  Dual constant;
-  int texture = -1;
-
-  template <class S>
-  S of(const Rgb<S>* at) const {
-    return at && texture >= 0 ? at[texture].r : as<S>(constant);
-  }
-};
-
-// The value of a BSDF and the density of `sample` for one pair of directions.
-struct BsdfValue {
-  Rgb<double> value;
-  double pdf = 0;  // [1/sr]
-};
 
 class Bsdf {
  public:
@@ -210,35 +169,5 @@ class Bsdf {
   std::vector<std::shared_ptr<Texture>> textures_;
   std::vector<std::string> texture_names_;
 };
-
-// Creates the BSDF that an element describes. InputError for bad values and for an unknown type
-// (the message lists the known ones).
-std::shared_ptr<Bsdf> make_bsdf(Properties& properties);
-std::shared_ptr<Bsdf> make_diffuse(const ConstantOrTexture& reflectance);
-
-// A rough conductor. The defaults are Mitsuba's: eta = 0, k = 1 reflects all light at every angle.
-struct RoughConductorValues {
-  enum class Distribution { kBeckmann, kGgx };
-  Distribution distribution = Distribution::kBeckmann;
-  // Roughness of the microfacet distribution, not squared; with alpha_v, alpha is that along the
-  // tangent and alpha_v that across.
-  ConstantOrTexture alpha = 0.1;
-  std::optional<ConstantOrTexture> alpha_v;
-  Rgb<double> eta{0, 0, 0};
-  Rgb<double> k{1, 1, 1};
-  ConstantOrTexture specular_reflectance = 1;
-};
-std::shared_ptr<Bsdf> make_roughconductor(const RoughConductorValues& values);
-
-// A rough plastic. The defaults are Mitsuba's.
-struct RoughPlasticValues {
-  RoughConductorValues::Distribution distribution = RoughConductorValues::Distribution::kBeckmann;
-  double alpha = 0.1;
-  double eta = 1.49 / 1.000277;  // index of refraction, inside over outside
-  bool nonlinear = false;        // whether colours shift by light that is reflected inside
-  ConstantOrTexture diffuse_reflectance = 0.5;
-  ConstantOrTexture specular_reflectance = 1;
-};
-std::shared_ptr<Bsdf> make_roughplastic(const RoughPlasticValues& values);
 
 }  // namespace limn

@@ -68,7 +68,5 @@ class RayTracer {
 // local coordinates, so that hits do not depend on their location, within the precision of float
 // positions. InputError with Embree's message if it fails (out of memory, unsupported machine).
 std::unique_ptr<RayTracer> make_embree_tracer(const Scene& scene, int threads);
-// Tests every face in double precision: the reference for tests.
-std::unique_ptr<RayTracer> make_brute_force_tracer(const Scene& scene);
 
 }  // namespace limn

@@ -1,18 +1,6 @@
 #pragma once
 // A point on a surface, over any scalar: where a ray meets a face, with its normals, and where the
-// rays start that leave it.
-//
-// Interpolated normals n_s mean a smooth surface, but rays meet flat faces: of the directions above
-// the smooth surface, n_s.wo > 0, some lie below the face, and a ray that started on the face would
-// begin inside the mesh, on this face and not on its neighbour. So rays start above the face, after
-// J. Hanika, Hacking the Shadow Terminator, Ray Tracing Gems II, 2021: with c_k the corners, n_k
-// their normals, b_k the barycentric coordinates of the hit x and d_k = (x - c_k).n_k,
-//     p = x + sum over k of g_k b_k d_k n_k.
-// Seen from outside, g_k = -1 where x lies below the tangent plane of a corner (d_k < 0), which is
-// Hanika's point. Where x lies above it, in a hollow, Hanika has 0; here g_k = kHollowLift, so that
-// no ray starts inside there either: what lies below the face sees the face itself. p is continuous
-// across edges, as it depends on the corners of an edge alone there, and faces whose corners have
-// their own normal stay as they are.
+// rays start that leave it: above faces with interpolated normals, see surface_lift.h.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -20,6 +8,7 @@
 #include "limn/core/ray_tracer.h"
 #include "limn/core/scene.h"
 #include "limn/core/slots.h"
+#include "limn/core/surface_lift.h"
 
 namespace limn {
 
@@ -70,63 +59,13 @@ S interpolate(const S& b0, const S& b1, const S& b2, const S& a0, const S& a1, c
   return b0 * a0 + b1 * a1 + b2 * a2;
 }
 
-// The less, the nearer is the start to the face, and the noisier are derivatives where the faces of
-// a hollow are seen from themselves. Not tuned.
-inline constexpr double kHollowLift = 0.125;
-
-// How far each corner lifts a point (the factors g_k above), and whether it comes clear of the
-// face.
-struct Lift {
-  std::array<double, 3> gain{};
-  bool clear = false;
-};
-
-// b, depth: b_k and d_k above; side: 1 if the face is seen from outside, else -1; size: twice the
-// area of the face.
-inline Lift lift_of(const std::array<Vec3d, 3>& normals, const std::array<double, 3>& b,
-                    const std::array<double, 3>& depth, const Vec3d& n_g, double side, double size,
-                    const Vec3d& p) {
-  // Relative to the face. Less is rounding: a tie, where the mean of both sides' slopes stands.
-  constexpr double kTie = 0x1p-20, kClear = 0x1p-17;
-  Lift lift;
-  double height = 0;
-  for (int k = 0; k < 3; ++k) {
-    if (!(b[k] > 0)) continue;  // rounding puts points beyond a side
-    const double above = side * depth[k];
-    const bool tie = above * above <= kTie * kTie * size;
-    lift.gain[k] = tie ? 0.5 * (kHollowLift - 1) : above < 0 ? -1 : kHollowLift;
-    height += side * lift.gain[k] * b[k] * depth[k] * dot(normals[k], n_g);
-  }
-  // Normals that point to the other side of the face do not lift.
-  if (height < -kClear * std::sqrt(size)) return {};
-  const double coordinate = std::max({std::fabs(p.x), std::fabs(p.y), std::fabs(p.z)});
-  lift.clear = height > 0 && height * height > kClear * kClear * size &&
-               height > 0x1p-21 * coordinate;  // the rounding of rays
-  return lift;
-}
-
-template <class S>
-std::array<Vec3<S>, 3> corner_normals(const Mesh& mesh, FaceId face) {
-  const FaceIndices& ids = mesh.normal_ids[face.index()];
-  std::array<Vec3<S>, 3> n;
-  for (int k = 0; k < 3; ++k) {
-    const Vec3d& a = mesh.normals[ids[k]];
-    n[k] = {a.x, a.y, a.z};
-    if constexpr (!std::is_same_v<S, double>) {
-      if (mesh.normal_tangents.empty()) continue;
-      const Vec3<Lanes>& d = mesh.normal_tangents[ids[k]];
-      n[k] = {{a.x, d.x}, {a.y, d.y}, {a.z, d.z}};
-    }
-  }
-  return n;
-}
-
-// Shading normal, and p lifted from the face if `lifts`, from the barycentric coordinates (b1, b2)
-// of the second and third corner. size: twice the area of the face; direction: of the ray that
-// meets it.
+// Shading normal, and p lifted from the face if `lifts`, from the barycentric coordinates of the
+// second and third corner. size: twice the area of the face; direction: of the ray that meets it.
 template <class S, class P>
-void interpolate_shading(const Mesh& mesh, const std::array<Vec3<P>, 3>& corners, S b1, S b2,
-                         double size, const Vec3d& direction, bool lifts, SurfacePoint<S>& point) {
+void interpolate_shading(const Mesh& mesh, const std::array<Vec3<P>, 3>& corners,
+                         std::array<S, 2> of_corners, double size, const Vec3d& direction,
+                         bool lifts, SurfacePoint<S>& point) {
+  auto& [b1, b2] = of_corners;
   // A face that is narrower than the rounding of its points has no coordinates across: its middle
   // stands for all.
   const bool wide = std::fabs(value(b1)) <= 2 && std::fabs(value(b2)) <= 2;
@@ -148,26 +87,6 @@ void interpolate_shading(const Mesh& mesh, const std::array<Vec3<P>, 3>& corners
     if (lift.gain[k] != 0) point.p = point.p + n[k] * (b[k] * d[k] * lift.gain[k]);
   }
   point.lifted = lift.clear;
-}
-
-// Brings what interpolate_shading reads into the cache, while the plane is still to be met.
-template <class S>
-void fetch_shading(const Mesh& mesh, FaceId face) {
-  const auto fetch = [](const auto& values, uint32_t i) {
-    const char* begin = reinterpret_cast<const char*>(&values[i]);
-    __builtin_prefetch(begin);
-    if (sizeof(values[i]) > 64) __builtin_prefetch(begin + sizeof(values[i]) - 1);
-  };
-  const FaceIndices& ids = mesh.normal_ids[face.index()];
-  const FaceIndices& vertices = mesh.face(face);
-  for (int k = 0; k < 3; ++k) {
-    fetch(mesh.normals, ids[k]);
-    // Plain numbers read no tangents.
-    if constexpr (!std::is_same_v<S, double>) {
-      if (!mesh.position_tangents.empty()) fetch(mesh.position_tangents, vertices[k]);
-      if (!mesh.normal_tangents.empty()) fetch(mesh.normal_tangents, ids[k]);
-    }
-  }
 }
 
 // lifts: above faces with interpolated normals.
@@ -202,9 +121,9 @@ void place_on_plane(const Mesh& mesh, const Vec3<S>& origin, const Vec3<S>& dire
     point.b = {dot(cross(q, e2), n) * inverse, dot(cross(e1, q), n) * inverse};
     return;
   }
-  interpolate_shading<S, P>(mesh, corners, dot(cross(q, e2), n) * inverse,
-                            dot(cross(e1, q), n) * inverse, 1 / value(over_length),
-                            value(direction), lifts, point);
+  interpolate_shading<S, P>(mesh, corners,
+                            {dot(cross(q, e2), n) * inverse, dot(cross(e1, q), n) * inverse},
+                            1 / value(over_length), value(direction), lifts, point);
 }
 
 // A point that no parameter moves.

@@ -10,31 +10,9 @@
 #include "limn/core/dual.h"
 #include "limn/core/mesh.h"
 #include "limn/core/vec.h"
+#include "limn/edgetree/edge_class.h"
 
 namespace limn {
-
-enum class EdgeClass : uint8_t {
-  // Two faces with continuous shading normals: discontinuous only as a silhouette.
-  kSmooth,
-  // Two faces with different shading normals: discontinuous if p sees one of the faces.
-  kSharp,
-  // A boundary edge, with one face: discontinuous from everywhere.
-  kBoundary,
-  // Non-manifold: more than two faces, two of opposite orientation, or united edges (touching.h).
-  // Treated as discontinuous from everywhere.
-  kIrregular,
-  // Two coplanar faces (exactly, or to rounding) with equal shading normals: discontinuous only
-  // from their common plane.
-  kFlat,
-  // An intersection segment of two faces of any shapes, see crossing_curves.h. Treated as
-  // discontinuous from everywhere.
-  kIntersection,
-  // A segment inside of a face across which its texture jumps, see texture_edges.h: discontinuous
-  // where p sees the face. It hides nothing.
-  kTexture,
-};
-
-const char* edge_class_name(EdgeClass edge_class);
 
 struct Edge {
   // Welded vertices of the mesh; the first face runs from [0] to [1]. Next to a face without area
@@ -152,8 +130,6 @@ struct EdgeMesh {
     __builtin_prefetch(incident_faces.data() + face_offsets[id.index()]);
   }
   uint64_t count(EdgeClass edge_class) const;
-  // Describes the first violated invariant of the above; empty if all hold.
-  std::string validate() const;
 };
 
 // An edge of a scene, or none.

@@ -1,4 +1,6 @@
 // Brute-force ray tracing in double precision: the reference for Embree.
+#include "support/brute_force_tracer.h"
+
 #include <algorithm>
 
 #include "limn/core/face_overlaps.h"

@@ -1,10 +1,11 @@
 // Checks the invariants of EdgeMesh.
+#include "support/edge_mesh_fault.h"
+
 #include <algorithm>
 #include <cmath>
 #include <string>
 
 #include "edgetree/edges/contacts.h"
-#include "limn/edgetree/edges.h"
 
 namespace limn {
 namespace {
@@ -137,12 +138,13 @@ const char* fault_of_edge(const EdgeMesh& mesh, EdgeId id) {
 
 }  // namespace
 
-std::string EdgeMesh::validate() const {
-  if (const char* fault = fault_of_sizes(*this)) return fault;
-  for (size_t f = 0; f < planes.size(); ++f)
-    if (const char* fault = fault_of(planes[f])) return "face " + std::to_string(f) + ": " + fault;
-  for (uint32_t e = 0; e < edges.size(); ++e)
-    if (const char* fault = fault_of_edge(*this, EdgeId(e)))
+std::string fault_of(const EdgeMesh& mesh) {
+  if (const char* fault = fault_of_sizes(mesh)) return fault;
+  for (size_t f = 0; f < mesh.planes.size(); ++f)
+    if (const char* fault = fault_of(mesh.planes[f]))
+      return "face " + std::to_string(f) + ": " + fault;
+  for (uint32_t e = 0; e < mesh.edges.size(); ++e)
+    if (const char* fault = fault_of_edge(mesh, EdgeId(e)))
       return "edge " + std::to_string(e) + ": " + fault;
   return {};
 }
