@@ -350,8 +350,8 @@ TEST(Regions, SmallSharesStayWholeOnAverage) {
   for (int i = 0; i < 20000; ++i) {
     const auto drawn = lines.draw(rng.uniform(), rng, rays);
     if (!drawn) continue;
-    const auto [density, share] =
-        penumbra_share(scene, input.edges(), *input.regions(), *edges, drawn->line, step, 0);
+    const EmitterWays ways{scene, input.edges(), *input.regions(), *edges};
+    const auto [density, share] = penumbra_share(ways, drawn->line, step, 0);
     if (!(share > 0.005 && share < 0.1)) continue;
     DrawnLine line = *drawn;
     const bool goes_on = lines.complete(line, step, 0, rng);
