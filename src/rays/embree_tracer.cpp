@@ -1,5 +1,9 @@
-// Ray tracing with Embree 3; the only file that includes it.
+// Ray tracing with Embree 3 or 4; the only file that includes it.
+#if __has_include(<embree3/rtcore.h>)
 #include <embree3/rtcore.h>
+#else
+#include <embree4/rtcore.h>
+#endif
 
 #include <algorithm>
 #include <cmath>
@@ -20,8 +24,52 @@
 namespace limn {
 namespace {
 
+// What versions 3 and 4 call differently. A filter is the context's in 3, the query's in 4.
+#if RTC_VERSION_MAJOR == 3
+using QueryContext = RTCIntersectContext;
+constexpr int kFilterOfQuery = RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION;
+void start(QueryContext& context, RTCFilterFunctionN filter) {
+  rtcInitIntersectContext(&context);
+  context.filter = filter;
+}
+void intersect(RTCScene scene, QueryContext& context, RTCRayHit& query) {
+  rtcIntersect1(scene, &context, &query);
+}
+void occlude(RTCScene scene, QueryContext& context, RTCRay& query) {
+  rtcOccluded1(scene, &context, &query);
+}
+#else
+struct QueryContext {
+  RTCRayQueryContext base;
+  RTCFilterFunctionN filter;
+};
+constexpr int kFilterOfQuery = RTC_SCENE_FLAG_FILTER_FUNCTION_IN_ARGUMENTS;
+void start(QueryContext& context, RTCFilterFunctionN filter) {
+  rtcInitRayQueryContext(&context.base);
+  context.filter = filter;
+}
+template <class Arguments>
+void set(Arguments& arguments, QueryContext& context) {
+  arguments.context = &context.base;
+  arguments.filter = context.filter;
+  if (context.filter) arguments.flags = RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER;
+}
+void intersect(RTCScene scene, QueryContext& context, RTCRayHit& query) {
+  RTCIntersectArguments arguments;
+  rtcInitIntersectArguments(&arguments);
+  set(arguments, context);
+  rtcIntersect1(scene, &query, &arguments);
+}
+void occlude(RTCScene scene, QueryContext& context, RTCRay& query) {
+  RTCOccludedArguments arguments;
+  rtcInitOccludedArguments(&arguments);
+  set(arguments, context);
+  rtcOccluded1(scene, &query, &arguments);
+}
+#endif
+
 struct Context {
-  RTCIntersectContext base;  // must be first: Embree passes back a pointer to it
+  QueryContext base;  // must be first: Embree passes back a pointer to it
   const Ray* ray;
   const Scene* scene;
   const DuplicateFaces* copies;
@@ -175,9 +223,8 @@ class EmbreeTracer final : public RayTracer {
     rtcSetDeviceErrorFunction(device_.get(), EmbreeErrors::note, &errors_);
     rtc_scene_.reset(rtcNewScene(device_.get()));
     errors_.check();
-    rtcSetSceneFlags(
-        rtc_scene_.get(),
-        static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION));
+    rtcSetSceneFlags(rtc_scene_.get(),
+                     static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | kFilterOfQuery));
     rtcSetSceneBuildQuality(rtc_scene_.get(), RTC_BUILD_QUALITY_HIGH);
     for (size_t i = 0; i < scene.shapes.size(); ++i)
       attach(scene.shapes[i].mesh, ShapeId(static_cast<uint32_t>(i)));
@@ -192,7 +239,7 @@ class EmbreeTracer final : public RayTracer {
     query.ray = to_embree(ray, origin_);
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-    rtcIntersect1(rtc_scene_.get(), &context.base, &query);
+    intersect(rtc_scene_.get(), context.base, query);
     const bool found = query.hit.geomID != RTC_INVALID_GEOMETRY_ID;
     if (found) {
       hit.face = {ShapeId(query.hit.geomID), FaceId(query.hit.primID)};
@@ -212,7 +259,7 @@ class EmbreeTracer final : public RayTracer {
       return true;
     Context context = make_context(ray);
     RTCRay query = to_embree(ray, origin_);
-    rtcOccluded1(rtc_scene_.get(), &context.base, &query);
+    occlude(rtc_scene_.get(), context.base, query);
     return query.tfar < 0;
   }
 
@@ -258,10 +305,9 @@ class EmbreeTracer final : public RayTracer {
   }
   Context make_context(const Ray& ray) const {
     Context context;
-    rtcInitIntersectContext(&context.base);
     const bool skips = ray.start.shape.valid() || ray.end.shape.valid() ||
                        !ray.skip_faces.empty() || ray.skip_emitters;
-    if (skips) context.base.filter = reject_skipped;
+    start(context.base, skips ? reject_skipped : nullptr);
     context.ray = &ray;
     context.scene = &scene_;
     context.copies = &copies_;

@@ -231,3 +231,11 @@ def test_curves_keep_their_radius(kind, tmp_path):
     points = np.asarray(scene.mesh("hair").positions)
     assert np.isclose(np.abs(points[:, :2]).max(), 0.5)
     assert np.ptp(points[:, 2]) == pytest.approx(4 if kind == "bsplinecurve" else 9)
+
+
+def test_errors_are_told_together():
+    with pytest.raises(limn.InputError) as error:
+        limn.load_dict({"type": "scene", "a": {"type": "nope"}, "b": 3,
+                        "c": {"type": "sphere", "d": {"type": "nope"}, "e": {}}})
+    places = [line.split(": error: ")[0] for line in str(error.value).splitlines()]
+    assert places == ["dict.a", "dict.b", "dict.c.d", "dict.c.e"]

@@ -11,6 +11,7 @@ import limn
 import numpy as np
 import pytest
 from conftest import ROOT
+from limn import _processor
 from limn._processor import missing
 
 EXAMPLES = os.path.join(ROOT, "tools", "python", "examples")
@@ -92,6 +93,21 @@ def test_wheels_tell_what_a_processor_lacks():
     info = "processor\t: 0\nflags\t\t: fpu avx fma\nbugs\t: none\n"
     assert missing("avx2 fma bmi2", info) == ["avx2", "bmi2"]
     assert missing("avx fma", info) == missing("avx2", "processor\t: 0\n") == []
+
+
+@pytest.mark.skipif(not os.path.exists("/proc/cpuinfo"), reason="no list of instruction sets")
+def test_wheels_choose_the_build_that_the_processor_runs(monkeypatch, tmp_path):
+    monkeypatch.setattr(_processor, "_FOLDER", str(tmp_path))
+    assert _processor.choose() == [] and _processor.program().endswith("bin/limn")
+    (tmp_path / "v4").mkdir()
+    (tmp_path / "v4" / "needs").write_text("fpu\n")
+    assert _processor.choose() == [str(tmp_path / "v4")]
+    assert _processor.program().endswith("bin/limn-v4")
+    (tmp_path / "v4" / "needs").write_text("fpu future\n")
+    assert _processor.choose() == []
+    (tmp_path / "needs").write_text("future\n")
+    with pytest.raises(ImportError, match="lacks future, which this wheel needs"):
+        _processor.choose()
 
 
 # PyTorch may not be there, and has no types of its own for what is subclassed.

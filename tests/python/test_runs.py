@@ -11,7 +11,11 @@ import time
 import limn
 import numpy as np
 import pytest
+from conftest import ROOT
 from test_scene import same
+
+sys.path.insert(0, os.path.join(ROOT, "tools"))
+import exr  # noqa: E402
 
 
 @pytest.mark.parametrize("threads", [1, 2])
@@ -24,6 +28,22 @@ def test_render_has_the_programs_bits(scene, program, threads):
     assert same(limn.render(scene, generator="sobol").value, program("render"))
     exact = limn.render(scene, spp=2, threads=threads, film="exact")
     assert same(exact.value, program("render", "--spp", "2", "--film", "exact", *independent))
+
+
+def test_layers_have_the_programs_bits(folder, scene):
+    names = ["normals", "depth", "uv", "alpha"]
+    layers = limn.layers(scene, names, spp=4, seed=3)
+    file = str(folder / "layers.exr")
+    subprocess.run([os.environ["LIMN_PROGRAM"], "render", str(folder / "scene.xml"), "--spp", "4",
+                    "--seed", "3", "--what", ",".join(names), "-o", file, "--quiet"], check=True)
+    wanted = exr.read(file)
+    assert list(layers) == names and layers["uv"].shape == (12, 16, 2)
+    for name, channels in zip(names, ("XYZ", "Y", "UV", "Y")):
+        for i, channel in enumerate(channels):
+            assert same(layers[name][..., i], wanted[f"{name}.{channel}"].astype(np.float32))
+    assert layers["alpha"].max() == 1 and limn.layers(scene, "depth", spp=1)["depth"].shape[2] == 1
+    with pytest.raises(limn.InputError, match="normals"):
+        limn.layers(scene, "normal")
 
 
 def test_an_estimate_computes_like_its_value(scene):

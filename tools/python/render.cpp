@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include "limn/core/names.h"
+#include "limn/integrators/layers.h"
 #include "tools/python/arguments.h"
 
 namespace limn::python {
@@ -50,6 +52,33 @@ struct RenderCall {
     warn_all(result.warnings);
     check_finite(result.non_finite, nb::cast(image));
     return image;
+  }
+};
+
+struct LayersCall {
+  const SceneHandle* scene = nullptr;
+  Names names;
+  RunRequest request;
+  nb::object progress = nb::none();
+
+  void take(Arguments& a) {
+    add_scene(a, scene);
+    a.add("names", kNamesType, "", names, ("of " + join(layer_names()) + ".").c_str());
+    add_run(a, request, progress);
+  }
+
+  nb::dict run(const Arguments&) {
+    const auto shared = scene->share();
+    LayersResult result;
+    run_job(settings_of(request, *shared), progress, [&](const RunSettings& settings) {
+      result = render_layers(*shared, to_list(names), settings);
+    });
+    nb::dict layers;
+    for (ImageLayer& layer : result.layers) {
+      layers[nb::cast(layer.name)] = nb::cast(to_array(std::move(layer.image)));
+    }
+    check_finite(result.non_finite, layers);
+    return layers;
   }
 };
 
@@ -157,6 +186,13 @@ void bind_render(nb::module_& m) {
       "\"faces\" an image has no noise (stderr is 0) and an exact derivative: that of "
       "limn.gradient, "
       "limn.image_loss, limn.backward and limn.Fit with the same points.");
+  def<LayersCall>(
+      m, "layers", "dict[str, numpy.ndarray]",
+      "What the camera sees besides light: float32, (H, W, 1), (H, W, 2) or (H, W, 3), by name.\n\n"
+      "\"normals\": unit shading normal, world axes; \"depth\": distance along the camera's ray, "
+      "scene units; \"position\": world space; \"uv\": texture coordinates, of shapes that have "
+      "textures; \"albedo\": share of light from the camera's direction that is scattered; "
+      "\"alpha\": 1. Means over each pixel's filter; all are 0 where the camera sees no surface.");
 }
 
 }  // namespace limn::python

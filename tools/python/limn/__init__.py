@@ -8,8 +8,10 @@
 
 from collections.abc import Mapping as _Mapping
 
-from . import _processor as _processor  # before what it checks for
-from ._limn import (
+from . import _processor
+
+__path__[:0] = _processor.choose()  # before what it checks for
+from ._limn import (  # noqa: E402
     Check,
     ComparedMethod,
     Comparison,
@@ -29,6 +31,7 @@ from ._limn import (
     gradient,
     image_loss,
     info,
+    layers,
     load,
     load_string,
     mesh_distance,
@@ -74,6 +77,7 @@ __all__ = [
     "gradient",
     "image_loss",
     "info",
+    "layers",
     "load",
     "load_dict",
     "load_string",

@@ -3,9 +3,11 @@
 import os
 import sys
 
+from . import _processor
+
 
 def main() -> None:
-    program = os.path.join(os.path.dirname(os.path.abspath(__file__)), "bin", "limn")
+    program = _processor.program()
     if not os.path.exists(program):
         sys.exit("limn: this build of the module holds no program: call build/limn")
     os.execv(program, ["limn", *sys.argv[1:]])

@@ -110,6 +110,7 @@ class _Writer:
         self.lines: list[str] = []
         self.places: list[str] = []
         self.files: dict[str, str] = {}  # the place of each mesh
+        self.errors: list[str] = []
 
     def line(self, place: str, text: str) -> None:
         self.lines.append(text)
@@ -142,10 +143,20 @@ class _Writer:
             own = what.get("id", place.removeprefix("dict."))
             attributes["id"] = _checked(f"{place}.id", own)
         self.element(place, tag, "", **attributes)
-        for key, value in what.items():
-            if key not in ("type", "id"):
-                self.value(f"{place}.{key}", _checked(f"{place}.{key}", key), value)
+        self.entries(place, what, ("type", "id"))
         self.line(place, f"</{tag}>")
+
+    def entries(self, place: str, what: Mapping[str, Any], known: Sequence[str]) -> None:
+        """All but the known ones. Errors of each are kept, so that one call tells all."""
+        for key, value in what.items():
+            if key in known:
+                continue
+            try:
+                if place == "dict" and not isinstance(value, Mapping):
+                    raise InputError(f"dict.{key}: error: expected a dictionary with a type")
+                self.value(f"{place}.{key}", _checked(f"{place}.{key}", key), value)
+            except InputError as error:
+                self.errors.append(str(error))
 
     def mesh(self, place: str, what: Mapping[str, Any]) -> dict[str, Any]:
         """The same shape with a mesh that limn reads: of a file, or of arrays."""
@@ -221,12 +232,9 @@ def load_dict(scene: Mapping[str, Any], folder: str = "") -> Scene:
 
 def _load(scene: Mapping[str, Any], writer: _Writer) -> Scene:
     writer.line("dict", '<scene version="3.0.0">')
-    for name, value in scene.items():
-        if name == "type":
-            continue
-        if not isinstance(value, Mapping):
-            raise InputError(f"dict.{name}: error: expected a dictionary with a type")
-        writer.object(f"dict.{name}", _checked(f"dict.{name}", name), value)
+    writer.entries("dict", scene, ("type",))
+    if writer.errors:
+        raise InputError("\n".join(writer.errors))
     writer.line("dict", "</scene>")
 
     def placed(text: str) -> str:
