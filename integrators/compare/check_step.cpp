@@ -24,7 +24,7 @@ constexpr int kPilotSamples = 8;  // per pixel, at least: variances need some
 constexpr int kPilotPart = 8;     // of the samples of the run
 // The bias of D_h that is allowed, in standard errors of the extrapolated differences, whose own
 // bias is less. With 1/4 and with 1, none of 276 and 400 right gradients was accused, and p < 0.05
-// came in 0.7 % of the runs (tools/check_levels).
+// came in 0.7 % of the runs (tests/statistical/check_levels.py).
 constexpr double kAllowedBias = 1;
 // Var(4 D_h - D_2h) / 9 over Var(D_h) for events at moving edges: those that h sees, 2h sees too.
 constexpr double kExtrapolated = 12.5 / 9;

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """How often `limn check` rejects a correct gradient: many small runs with correct gradients.
 
-    tools/check_levels/check_levels.py [--limn build/limn] [--runs 200] [--keep FILE.json]
+    tests/statistical/check_levels.py [--limn build/limn] [--runs 200] [--keep FILE.json]
 
 Scenes of its own (huge floors, long shapes, tiny emitters, gloss) and those of scenes/closed_form, each
 with several parameters, every run with a seed and a number of samples of its own. Prints the

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Scenes whose picture and derivatives are known in closed form: writes scenes/closed_form.
 
-  tools/closed_form/closed_form.py                 writes every scene and references.json (needs numpy)
-  tools/closed_form/closed_form.py --mitsuba       compares them with Mitsuba 3 (needs mitsuba), see README there
+  tests/closed_form/closed_form.py                 writes every scene and references.json (needs numpy)
+  tests/closed_form/closed_form.py --mitsuba       compares them with Mitsuba 3 (needs mitsuba), see README there
 
 Derivatives are central differences of the closed form, of eighth order, in double precision: they
 come from formulas alone, no random number enters. Every scene is evaluated twice, with more Gauss
