@@ -137,7 +137,7 @@ def scene(folder, name, **parts):
 
 
 def cases(folder):
-    """(name, parts of the scene, options of limn)."""
+    """(name, parts of the scene, limn's shading)."""
     sky = os.path.join(folder, "sky.exr")
     write_sky(sky, 32, 16)
     envmap = f"""<emitter type="envmap"><string name="filename" value="{sky}"/>
@@ -150,52 +150,52 @@ def cases(folder):
 
 
 def sensors_and_films():
-    yield "base", {}, []
+    yield "base", {}, "continuous"
     for depth in (1, 2, 4, 5):
         yield f"max_depth {depth}", {"integrator": DEPTH.format(depth, 1000),
-                                     "objects": CUBE + VISIBLE_LAMP}, []
-    yield "roulette", {"integrator": DEPTH.format(-1, 2)}, []
-    yield "roulette default", {"integrator": ""}, []
+                                     "objects": CUBE + VISIBLE_LAMP}, "continuous"
+    yield "roulette", {"integrator": DEPTH.format(-1, 2)}, "continuous"
+    yield "roulette default", {"integrator": ""}, "continuous"
     for text in ('<rfilter type="tent"/>', '<rfilter type="tent"><float name="radius" value="1.7"/></rfilter>',
                  '<rfilter type="gaussian"/>',
                  '<rfilter type="gaussian"><float name="stddev" value="0.8"/></rfilter>', BOX):
         for border in ("true", "false"):
             kind = text.split('"')[1] + (text.split('value="')[1][:3] if "value" in text else "")
             film = SIZE.format(24, 24) + f'<boolean name="sample_border" value="{border}"/>' + text
-            yield f"filter {kind} border {border}", {"film": film}, []
-    yield "filter gaussian 8 x 8", {"film": SIZE.format(8, 8) + '<rfilter type="gaussian"/>'}, []
+            yield f"filter {kind} border {border}", {"film": film}, "continuous"
+    yield "filter gaussian 8 x 8", {"film": SIZE.format(8, 8) + '<rfilter type="gaussian"/>'}, "continuous"
     crop = "".join(f'<integer name="crop_{n}" value="{v}"/>' for n, v in
                    (("offset_x", 9), ("offset_y", 4), ("width", 24), ("height", 16)))
-    yield "crop", {"film": SIZE.format(64, 40) + crop + BOX}, []
-    yield "crop gaussian", {"film": SIZE.format(64, 40) + crop}, []
+    yield "crop", {"film": SIZE.format(64, 40) + crop + BOX}, "continuous"
+    yield "crop gaussian", {"film": SIZE.format(64, 40) + crop}, "continuous"
     for axis, size in itertools.product(("x", "y", "diagonal", "smaller", "larger"),
                                         ((56, 32), (32, 56))):
         sensor = FOV + f'<string name="fov_axis" value="{axis}"/>'
-        yield f"fov_axis {axis} {size[0]}", {"sensor": sensor, "film": SIZE.format(*size) + BOX}, []
+        yield f"fov_axis {axis} {size[0]}", {"sensor": sensor, "film": SIZE.format(*size) + BOX}, "continuous"
     yield "principal point", {"sensor": FOV + '<float name="principal_point_offset_x" value="0.1"/>'
-                              '<float name="principal_point_offset_y" value="-0.2"/>'}, []
-    yield "focal length", {"sensor": '<string name="focal_length" value="40mm"/>'}, []
+                              '<float name="principal_point_offset_y" value="-0.2"/>'}, "continuous"
+    yield "focal length", {"sensor": '<string name="focal_length" value="40mm"/>'}, "continuous"
     yield "clip planes", {"sensor": FOV + '<float name="near_clip" value="5.5"/>'
-                          '<float name="far_clip" value="7.5"/>'}, []
+                          '<float name="far_clip" value="7.5"/>'}, "continuous"
     for radius, focus in ((0.2, 5), (0.5, 9), (1.5, 3)):
         lens = (f'<float name="aperture_radius" value="{radius}"/>'
                 f'<float name="focus_distance" value="{focus}"/><float name="near_clip" value="5"/>')
-        yield f"thinlens {radius}", {"camera": "thinlens", "sensor": FOV + lens}, []
+        yield f"thinlens {radius}", {"camera": "thinlens", "sensor": FOV + lens}, "continuous"
     yield "thinlens focus", {"camera": "thinlens", "sensor": FOV +
-                             '<float name="aperture_radius" value="0.1"/>'}, []
+                             '<float name="aperture_radius" value="0.1"/>'}, "continuous"
 
 
 def materials(envmap):
     for distribution, alpha in itertools.product(("ggx", "beckmann"), (0.05, 0.2, 0.6)):
         bsdf = CONDUCTOR.format(distribution=distribution, alpha=alpha)
-        yield f"{distribution} {alpha} envmap", {"floor": bsdf, "lights": envmap}, []
+        yield f"{distribution} {alpha} envmap", {"floor": bsdf, "lights": envmap}, "continuous"
         yield f"{distribution} {alpha} lamp", {"floor": bsdf, "lights": ONE_LAMP + CONSTANT,
-                                               "objects": CUBE + VISIBLE_LAMP}, []
-    yield "default conductor", {"floor": '<bsdf type="roughconductor"/>'}, []
-    yield "envmap diffuse", {"lights": envmap}, []
+                                               "objects": CUBE + VISIBLE_LAMP}, "continuous"
+    yield "default conductor", {"floor": '<bsdf type="roughconductor"/>'}, "continuous"
+    yield "envmap diffuse", {"lights": envmap}, "continuous"
     yield "twosided", {"objects": CUBE.replace("rotate y", "rotate x"), "floor":
                        f'<bsdf type="twosided">{CONDUCTOR.format(distribution="ggx", alpha=0.3)}{GREY}</bsdf>',
-                       "sensor": FOV, "lights": VISIBLE_LAMP.replace('y="1.2"', 'y="-1.5"') + envmap}, []
+                       "sensor": FOV, "lights": VISIBLE_LAMP.replace('y="1.2"', 'y="-1.5"') + envmap}, "continuous"
 
 
 def kinds_of_light(envmap):
@@ -203,14 +203,14 @@ def kinds_of_light(envmap):
                          ("wide spot", WIDE_SPOT), ("directional", DIRECTIONAL),
                          ("turned directional", TURNED_DIRECTIONAL),
                          ("delta lights and others", POINT + SPOT + DIRECTIONAL + ONE_LAMP + envmap)):
-        yield name, {"lights": lights}, []
+        yield name, {"lights": lights}, "continuous"
         yield f"{name} gloss", {"lights": lights, "floor": CONDUCTOR.format(
-            distribution="ggx", alpha=0.2)}, []
+            distribution="ggx", alpha=0.2)}, "continuous"
     yield "two lamps", {"lights": LAMP.format(angle=90, size=0.5, x=-1, radiance="8,1,1") +
-                        LAMP.format(angle=70, size=0.3, x=2, radiance="1,9,30")}, []
+                        LAMP.format(angle=70, size=0.3, x=2, radiance="1,9,30")}, "continuous"
     yield "hide_emitters", {"integrator": DEPTH.format(3, 1000) +
                             '<boolean name="hide_emitters" value="true"/>',
-                            "objects": CUBE + VISIBLE_LAMP}, []
+                            "objects": CUBE + VISIBLE_LAMP}, "continuous"
 
 
 def shapes_of_all_kinds(folder, envmap):
@@ -232,21 +232,21 @@ def shapes_of_all_kinds(folder, envmap):
                 <transform name="to_world"><scale {axis}="-1"/><scale value="0.9"/><rotate y="1" angle="15"/>
                 <translate x="0.3" y="1" z="0.5"/></transform>{on}</shape>"""
             yield f"mirrored {kind}{of} {axis} flip {flip}", {"objects": mirrored}, \
-                ["--shading", "mitsuba"] if kind.startswith("obj") else []
+                "mitsuba" if kind.startswith("obj") else "continuous"
     for kind, bsdf in (("diffuse", GREY), ("twosided", f'<bsdf type="twosided">{GREY}</bsdf>'),
                        ("ggx", CONDUCTOR.format(distribution="ggx", alpha=0.15))):
         mesh = MESH.format(file=sphere, flat="false", scale=0.8, bsdf=bsdf)
         yield f"smooth {kind}", {"objects": CUBE + mesh, "lights": ONE_LAMP + envmap}, \
-            ["--shading", "mitsuba"]
+            "mitsuba"
     for kind, bsdf in TRANSPARENT.items():
         cube = CUBE.replace('<bsdf type="diffuse"/>', bsdf)
         mesh = MESH.format(file=sphere, flat="false", scale=0.8, bsdf=bsdf)
-        yield f"{kind} cube", {"objects": cube + VISIBLE_LAMP, "lights": CONSTANT}, []
-        yield f"{kind} ball", {"objects": mesh, "lights": envmap}, ["--shading", "mitsuba"]
+        yield f"{kind} cube", {"objects": cube + VISIBLE_LAMP, "lights": CONSTANT}, "continuous"
+        yield f"{kind} ball", {"objects": mesh, "lights": envmap}, "mitsuba"
     flat = MESH.format(file=sphere, flat="true", scale=0.8, bsdf=GREY)
-    yield "flat sphere", {"objects": flat, "lights": envmap}, []
+    yield "flat sphere", {"objects": flat, "lights": envmap}, "continuous"
 
 
 def suite(folder):
-    for name, parts, options in cases(folder):
-        yield name, scene(folder, name, **parts), options
+    for name, parts, shading in cases(folder):
+        yield name, scene(folder, name, **parts), shading

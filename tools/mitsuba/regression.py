@@ -70,14 +70,14 @@ def references_of(scene):
     return None
 
 
-def images_of(limn, scene, options, spp):
+def images_of(limn, scene, options, spp, shading="mitsuba"):
     """SEEDS by H by W by 3."""
     images = []
     with tempfile.TemporaryDirectory() as folder:
         file = os.path.join(folder, "image.exr")
         for seed in range(SEEDS):
             command = [limn, "render", scene, "-o", file, "--spp", str(spp), "--seed", str(seed),
-                       "--generator", "independent", "--shading", "mitsuba", "--quiet", *options]
+                       "--generator", "independent", "--shading", shading, "--quiet", *options]
             subprocess.run(command, check=True, stderr=subprocess.DEVNULL)
             images.append(read(file))
     return np.stack(images)
@@ -126,15 +126,15 @@ def reference_of(image, variance):
     return block_sums(image, block), block_sums(np.maximum(variance, 0), block) / REFERENCE_SAMPLES
 
 
-def largest_score(images, theirs, their_seeds):
+def largest_score(images, theirs, their_seeds, rounding=2.0**-11):
     """The largest score of a block, and the probability of one as large among so many.
 
-    theirs: what mean_of or reference_of says; their_seeds: SEEDS or infinity, likewise.
+    theirs: what mean_of or reference_of says; their_seeds: SEEDS or infinity, likewise; rounding:
+    of a pixel, relative (images in halves).
     """
     mean, ours = mean_of(images)
-    # Images in halves: one rounding of each pixel.
-    rounding = block_sums((images.mean(axis=0) * 2.0**-11) ** 2, block_of(images[0])) + 1e-20
-    total = ours + theirs[1] + rounding
+    rounded = block_sums((images.mean(axis=0) * rounding) ** 2, block_of(images[0])) + 1e-20
+    total = ours + theirs[1] + rounded
     t = (mean - theirs[0]) / np.sqrt(total)
     # Welch's t, as a normal score of the same tail (Wallace 1959).
     known = ours**2 / (SEEDS - 1) + theirs[1]**2 / (their_seeds - 1)
