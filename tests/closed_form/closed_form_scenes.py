@@ -225,6 +225,24 @@ def lamp_in_mirror():
     return scene, models.LampInMirror(["mirror"]), names
 
 
+def lamp_in_corner():
+    """The floor sees a part of the lamp in a mirror, and in two one after the other, each of which cuts
+    it. It sees nothing lit of itself in them: they stand high enough to show what is above it."""
+    scene, _, _ = lamp_in_mirror()
+    mirror = parallelogram((-1.5, 0.5, -1.5), (0.0625, 0.875, 0), (0.0625, 0.125, 3.5))
+    other = parallelogram((-1.125, 0.375, -2.1875), (1.5, 0.0625, 0.125), (0.0625, 1, 0.0625))
+    mirror.bsdf = Bsdf("mirror_bsdf", "mirror", vector(0.75, 0.5, 0.875))
+    other.bsdf = Bsdf("other_bsdf", "mirror", vector(0.875, 0.75, 0.625))
+    scene.name, scene.max_depth, scene.camera.fov = "lamp_in_corner.xml", 4, 0.25
+    scene.shapes = {"floor": scene.shapes["floor"], "mirror": mirror, "other": other,
+                    "lamp": scene.shapes["lamp"]}
+    names = ["mirror.translate.x", "mirror.rotate.y", "mirror.scale", "other.translate.z",
+             "other.rotate.x", "other.rotate.y", "lamp.translate.x", "lamp.rotate.z",
+             "floor.translate.y", "floor.rotate.x", "sensor.translate.x",
+             "mirror_bsdf.specular_reflectance", "other_bsdf.specular_reflectance"]
+    return scene, models.LampInMirror(["mirror"], ["other", "mirror"]), names
+
+
 def through_glass(name, glass, moves, max_depth, *faces):
     camera = Camera(vector(0.25, 3, -1.5), vector(0.25, -1, 0.25), vector(0, 1, 0), 40, 2, 1)
     near = lamp(parallelogram((-0.875, -1.25, 0), (0.125, 0.0625, 0.5), (0.75, -0.125, 0.0625)),
@@ -439,6 +457,7 @@ SCENES = {
          "near.translate.x", "near.rotate.z", "far.translate.y", "far.scale",
          "mirror_bsdf.specular_reflectance"], radius=0.0625, focus=3.5, width=1, height=1),
     "lamp_in_mirror": lamp_in_mirror,
+    "lamp_in_corner": lamp_in_corner,
     "lamps_behind_mask": lamps_behind_mask,
     "lamp_behind_mask": lamp_behind_mask,
     "lamps_under_water": lamps_under_water,
