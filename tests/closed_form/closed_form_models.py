@@ -414,6 +414,28 @@ class LampsInMirror:
         return pixels(camera, mean)
 
 
+class LampsInWedge:
+    """The same in two faces of "mirror" that meet in a crease, which hide nothing of each other: the
+    sum over both, each of which shows one of the lamps."""
+
+    outlines_in_view = True
+
+    def image(self, domain, shade, outline, shadow, order):
+        camera, sky, mirror = domain.camera, shade.environment, domain.shapes["mirror"]
+        share, cover = shade.shapes["mirror"].bsdf.reflectance, Filter(camera.filter).over_polygon
+        parts = []
+        for k in range(2):
+            window = film_loop(domain, mirror.face(k))
+            near, far = (clip_convex(film_loop(domain, mirrored(
+                domain.shapes[name].face(0), mirror.face(k))), window) for name in ("near", "far"))
+            parts += [(window, (share - 1) * sky)]
+            parts += [(loop, share * (shade.shapes[name].radiance - sky))
+                      for name, loop in (("near", near), ("far", far)) if len(loop) > 2]
+        assert len(parts) == 4, "each face shows one lamp"
+        return pixels(camera, lambda corner: sky + sum(
+            cover(loop, corner + 0.5) * jump for loop, jump in parts))
+
+
 class LampsBehindMask:
     """LampsInView, a part of it behind the flat shape "mask" of opacity o: with c(m) what the mask
     covers, I - o (I restricted to m)."""

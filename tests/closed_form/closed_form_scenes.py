@@ -191,6 +191,25 @@ def square_in_mirror():
     return scene, models.LampsInMirror(), names
 
 
+def mirror_wedge():
+    """A lamp in each of two mirrors that meet in a crease, which cuts their images."""
+    scene, _, _ = square_in_mirror()
+    bsdf = scene.shapes["mirror"].bsdf
+    mirror = Shape(vector(0.4375, -0.6875, -0.3125, 0.5, 1.25, -0.25, -0.5, 1.3125, 0.125,
+                          -0.5625, -0.625, 0.0625, 1.5625, -0.625, 0.0625,
+                          1.625, 1.3125, 0.125).reshape(6, 3), [[0, 3, 2, 1], [0, 1, 5, 4]])
+    mirror.bsdf = bsdf
+    near = lamp(parallelogram((-2.125, 0.125, -2.9375), (0.0625, 1.125, 0.0625), (-0.6875, 0, 0.75)),
+                (3, 1, 0.5), "near")
+    far = lamp(parallelogram((3.5, 0.125, -2.25), (0.125, 1.25, 0), (-0.625, 0.0625, -0.8125)),
+               (0.5, 2, 4), "far")
+    scene.name = "mirror_wedge.xml"
+    scene.shapes = {"mirror": mirror, "near": near, "far": far}
+    names = moves_of("mirror") + ["near.translate.x", "near.rotate.z", "far.translate.y",
+                                  "far.scale", "sensor.translate.x", "mirror_bsdf.specular_reflectance"]
+    return scene, models.LampsInWedge(), names
+
+
 def orthographic_mirror():
     """The same with the lamps where parallel rays meet both; the only pixel sees all of the mirror."""
     scene, model, names = square_in_mirror()
@@ -456,6 +475,7 @@ SCENES = {
         ["sensor.translate.x", "sensor.rotate.y", "mirror.translate.z", "mirror.rotate.y",
          "near.translate.x", "near.rotate.z", "far.translate.y", "far.scale",
          "mirror_bsdf.specular_reflectance"], radius=0.0625, focus=3.5, width=1, height=1),
+    "mirror_wedge": mirror_wedge,
     "lamp_in_mirror": lamp_in_mirror,
     "lamp_in_corner": lamp_in_corner,
     "lamps_behind_mask": lamps_behind_mask,
