@@ -68,9 +68,10 @@ TEST_P(ClosedFormBackward, IsExact) {
 INSTANTIATE_TEST_SUITE_P(, ClosedFormBackward,
                          testing::Values("board_in_sky", "seam_in_sky", "board_in_gloss",
                                          "square_in_mirror", "square_in_mirror_orthographic",
-                                         "square_in_mirror_thinlens", "lamp_in_mirror",
-                                         "lamp_in_corner", "lamps_behind_mask", "lamp_behind_mask",
-                                         "lamps_under_water", "lamps_through_pane"),
+                                         "square_in_mirror_thinlens", "mirror_wedge",
+                                         "lamp_in_mirror", "lamp_in_corner", "lamps_behind_mask",
+                                         "lamp_behind_mask", "lamps_under_water",
+                                         "lamps_through_pane"),
                          [](const auto& test) { return std::string(test.param); });
 
 }  // namespace
