@@ -66,7 +66,7 @@ bool is_too_noisy(const std::string& name, const ExactCase& of) {
 int more_samples(const std::string& name, const ExactCase& of) {
   if (name == "lamps_under_water" && of.term == "camera") return 32;
   if (name.starts_with("square_in_mirror_")) return 12;
-  if (name == "lamp_in_corner") return 5;
+  if (name == "lamp_in_corner") return 8;
   return name == "board_in_gloss" ? 3 : 1;
 }
 

@@ -14,12 +14,15 @@ A check that cannot tell is repeated with the samples that it asks for, cheapest
 that takes at most --seconds (20) of processor time by what the last run took. Beyond that,
 up to three parameters of the kind are tried, and the cheapest continues. An array moves along one field
 (vertices by the same vector, texels by the same amount), or by one of its numbers.
-A reverse check is conclusive if an error as large as the derivative would show.
+A reverse check is conclusive if an error as large as the derivative would show. A forward check is
+so if an error of a fifth of each term would; "agree coarsely" says that one as large as the whole
+derivative would have shown, which takes less time and is asked for first.
 
 Results are kept in FOLDER/results.json (out/derivatives) and a later call goes on from there; after
 a change of limn, remove it. The exit status is 1 where a check disagrees, or fewer than --at-least
 agree. Two disagreements in mitsuba-data: edges of a projector's frame are missing (limn warns), and
-the opacity of a textured mask, perhaps because texels of 0 and 1 are at the ends of their range.
+the opacity of a textured mask: most texels are 0 or 1, the ends of their range, beyond which
+nothing changes, so that central differences hold half of the slope. With texels inside they agree.
 """
 
 import argparse
@@ -48,6 +51,9 @@ VISIBLE = 3.89 + 1.64
 SIZE = re.compile(r'(<integer\s+name\s*=\s*"(?:width|height)"\s+value\s*=\s*)"[^"]*"')
 CROP = re.compile(r'<integer\s+name\s*=\s*"crop_\w+"[^>]*>')
 SMOOTH = re.compile(r"\b(conductor|dielectric|thindielectric|plastic)\b")
+# Of what a check can see, by its samples (integrators/compare/check.cpp).
+SAMPLES_POWER = 2.5
+COARSELY = "agree coarsely"
 FORWARD, REVERSE = "forward", "reverse"
 
 
@@ -133,10 +139,15 @@ def timed(command):
 
 def forward_result(report):
     needed = report["needed_spp"]
+    verdict, visible = report["verdict"], report["visible"].get("total")
+    coarse = report["spp"] * max(1, visible if visible is not None else math.inf)**SAMPLES_POWER
+    if verdict == "cannot tell" and coarse <= report["spp"] and not report["bends"]:
+        verdict = COARSELY
     keys = ("verdict", "p", "gradient_sum", "gradient_sum_stderr", "difference_sum",
             "difference_sum_stderr", "smallest_at", "suspect", "bends")
     return {"needed": math.inf if report["bends"] or not needed else needed,
-            **{key: report[key] for key in keys if key in report}}
+            **{key: report[key] for key in keys if key in report},
+            "verdict": verdict, "coarse": coarse, "visible": visible}
 
 
 def reverse_result(report, spp):
@@ -160,7 +171,7 @@ class Check:
     def result(self):
         """The one that decides, or has come nearest to that."""
         runs = list(self.runs.values())
-        for verdict in ("disagree", "agree", "not complete"):
+        for verdict in ("disagree", "agree", "not complete", COARSELY):
             for run in runs:
                 if run["verdict"] == verdict:
                     return run
@@ -173,13 +184,16 @@ class Check:
             return None
         steps = []
         for parameter, run in self.runs.items():
-            if run["verdict"] != "cannot tell" or not math.isfinite(run["needed"]):
+            if run["verdict"] not in ("cannot tell", COARSELY):
                 continue
-            per_sample = run["seconds"] / run["spp"]
-            wanted = max(2 * run["spp"], 1.2 * run["needed"])
-            if wanted * per_sample <= most_seconds * (4 if run["spp"] == FIRST_SPP else 1):
-                spp = int(min(wanted, MOST_GROWTH * run["spp"]))
-                steps.append((spp * per_sample, parameter, spp))
+            per_sample = run.get("per_sample", run["seconds"] / run["spp"])
+            for needed in (run["needed"], run.get("coarse", math.inf)):
+                wanted = max(2 * run["spp"], 1.2 * needed)
+                if needed <= run["spp"] or not math.isfinite(needed):
+                    continue
+                if wanted * per_sample <= most_seconds * (4 if run["spp"] == FIRST_SPP else 1):
+                    spp = int(min(wanted, MOST_GROWTH * run["spp"]))
+                    steps.append((spp * per_sample, parameter, spp))
         untried = [name for name, _ in self.candidates if name not in self.runs]
         if not steps and untried:
             steps = [(self.rank + len(self.runs), untried[0], FIRST_SPP)]
@@ -245,6 +259,10 @@ def work_off(arguments, checks, results):
         i = min(steps, key=lambda i: steps[i][0])
         check, (_, parameter, spp) = checks[i], steps.pop(i)
         result = run_check(arguments.limn, arguments.output, check, parameter, spp)
+        last = check.runs.get(parameter)
+        if last and last["spp"] < spp:  # without what pilots and files take
+            slope = (result["seconds"] - last["seconds"]) / (spp - last["spp"])
+            result["per_sample"] = max(slope, 0.2 * result["seconds"] / spp)
         check.runs[parameter] = result
         common.write_json(os.path.join(arguments.output, "results.json"), results)
         print(f"{check.scene.name:58} {check.mode} {parameter} {spp}: {result['verdict']}",
@@ -256,14 +274,14 @@ def work_off(arguments, checks, results):
 
 
 def print_table(checks):
-    verdicts = ("agree", "cannot tell", "not complete", "refused", "not run", "disagree")
+    verdicts = ("agree", COARSELY, "cannot tell", "not complete", "refused", "not run", "disagree")
     table = collections.defaultdict(collections.Counter)
     for check in checks:
         for row in (check.kind, "all " + check.mode):
             table[row][check.result()["verdict"]] += 1
-    print(f"\n{'kind':36}" + "".join(f"{verdict:>14}" for verdict in verdicts))
+    print(f"\n{'kind':36}" + "".join(f"{verdict:>15}" for verdict in verdicts))
     for row in sorted(table, key=lambda row: (row.startswith("all "), row)):
-        print(f"{row:36}" + "".join(f"{table[row][verdict]:14}" for verdict in verdicts))
+        print(f"{row:36}" + "".join(f"{table[row][verdict]:15}" for verdict in verdicts))
     for check in checks:
         result = check.result()
         if result["verdict"] in ("disagree", "refused"):
@@ -306,7 +324,8 @@ def main():
     counts = collections.Counter(check.result()["verdict"] for check in checks)
     told = [s.name for s in scenes
             if {c.result()["verdict"] for c in checks if c.scene is s} == {"agree"}]
-    print(f"{counts['agree']} of {len(checks)} checks agree, {counts['disagree']} disagree, in "
+    print(f"{counts['agree']} of {len(checks)} checks agree, {counts[COARSELY]} more coarsely, "
+          f"{counts['disagree']} disagree, in "
           f"{len(scenes)} scenes ({smooth} more have smooth lobes); in {len(told)} all agree; "
           f"{left} checks can go on")
     return 1 if counts["disagree"] or counts["agree"] < arguments.at_least else 0
