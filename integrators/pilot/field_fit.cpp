@@ -37,6 +37,9 @@ constexpr double kLeast = 0.01;
 // emitters and in the sun they do (2, 5e-3), and leaving it out costs a tenth. Not tuned in
 // between.
 constexpr double kChanged = 1e-3;
+// A term counts as if it had at least this share of the variance: turns may be all that makes it
+// noisy. Not tuned.
+constexpr double kLeastShare = 0.01;
 
 // Variance of the derivative plus the combination of the unknowns.
 double variance_with(const Covariances& c, int parameter, const Coefficients& b) {
@@ -183,9 +186,9 @@ class Fitter {
     for (size_t slot = 0; slot < slots; ++slot) turned.push_back(turned_variance(slot));
     const double all_turned = std::accumulate(turned.begin(), turned.end(), 0.0);
     for (size_t slot = 0; slot < slots; ++slot) {
-      if (!(means[slot] > 0)) continue;
-      if (turned[slot] / all_turned < kChanged * means[slot] / variance) continue;
-      const auto weight = static_cast<float>(std::sqrt(figures_.work[slot] / means[slot]));
+      const double mean = std::max(means[slot], kLeastShare * variance);
+      if (!(turned[slot] > 0) || turned[slot] / all_turned < kChanged * mean / variance) continue;
+      const auto weight = static_cast<float>(std::sqrt(figures_.work[slot] / mean));
       for (int half = 0; half < 2; ++half) {
         for (size_t cell = 0; cell < grid_.size(); ++cell) {
           float* to = total_[half].entries(cell);
