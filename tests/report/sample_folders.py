@@ -267,7 +267,8 @@ def fitting(folder, status="done"):
         "targets": targets,
         "warnings": [],
         "history": [
-            {"step": s, "loss": v, "stderr": 1e-4 if s else None, "halvings": s // 44, "seconds": 1}
+            {"step": s, "loss": v, "stderr": 1e-4 if s else None, "halvings": s // 44, "seconds": 1,
+             "values": {"clay.reflectance": 0.5 + s / 400}}
             for s, v in enumerate(loss)
         ],
         "snapshots": [

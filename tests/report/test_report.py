@@ -195,7 +195,11 @@ class TestReport(unittest.TestCase):
             self.assertIn(f"<h4>{step}</h4>", page)
         self.assertIn("clay.reflectance: 0.6123", page)
         self.assertIn("1 steps were halved", page)
-        self.assertEqual(page.count("<svg"), 2)
+        # The loss to its last step, where it is below zero; the scalar; distances.
+        self.assertEqual(page.count("<svg"), 3)
+        self.assertIn("loss over 45 steps, with its standard error; an unbiased estimate, below zero"
+                      " at the 6 steps with a mark", page)
+        self.assertIn("<td>0.59750</td>", page)  # after 40 steps
         self.assertIn("15.0°", page)
         self.assertNotIn("goes on", page)
         stopped = fitting(os.path.join(self.temporary.name, "stopped"), "interrupted")

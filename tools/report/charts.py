@@ -276,7 +276,9 @@ def false_positives_by_depth(figure, panels, palette, variants):
 
 @chart(7.2, 3.0)
 def loss_over_steps(figure, panel, palette, rows):
-    """rows: (step, loss, its standard error); losses below zero are noise, and are left out."""
+    """rows: (step, loss, its standard error). Those below zero are noise: ticks below the curve."""
+    below = [s for s, v, _ in rows if v is not None and v <= 0]
+    panel.set_xlim(rows[0][0], max(rows[-1][0], rows[0][0] + 1))
     shown = [(s, v, e) for s, v, e in rows if v is not None and v > 0]
     if shown:
         steps, losses, errors = zip(*shown)
@@ -288,7 +290,24 @@ def loss_over_steps(figure, panel, palette, rows):
         log_axis(panel.yaxis, min(losses), max(1.01 * min(losses), *high))
     panel.set_xlabel("step")
     panel.set_ylabel("loss")
-    return f"loss over {len(rows)} steps, with its standard error"
+    text = f"loss over {len(rows)} steps, with its standard error"
+    if not below:
+        return text
+    panel.plot(below, [0.02] * len(below), linestyle="", marker="|", color=palette.ink("fit"),
+               transform=panel.get_xaxis_transform())
+    panel.set_xlabel("step (marks: losses below zero, which an unbiased estimate may be)")
+    return f"{text}; an unbiased estimate, below zero at the {len(below)} steps with a mark"
+
+
+@chart(9.6, 3.0)
+def values_over_steps(figure, panel, palette, numbers):
+    """numbers: name to rows (step, value)."""
+    for (name, rows), line in zip(numbers.items(), itertools.cycle(["-", "--", ":", "-."])):
+        panel.plot([r[0] for r in rows], [r[1] for r in rows], linestyle=line,
+                   color=palette.ink("fit"), label=name)
+    panel.set_xlabel("step")
+    panel.legend()
+    return "values over steps"
 
 
 @chart(9.6, 3.0, 2)

@@ -4,6 +4,7 @@ from . import charts
 from .markup import count, element, figures, join, plural, table, with_error
 from .section import Section, status_notice, stem
 
+MOST_CURVES = 8  # of scalars; the table has all
 STRIP = 7  # columns of the strip at most; the table has all snapshots
 
 # Columns of the table of snapshots, head: (key, text).
@@ -43,6 +44,7 @@ class FitSection(Section):
             self._strip(),
             element("h3", "Loss"),
             charts.loss_over_steps(self.palette, losses) if losses else "No step yet.",
+            self._values(),
             self._distances(),
             element("h3", "Snapshots"), self._table(),
             element("h3", "Settings"), self._settings()]
@@ -67,6 +69,23 @@ class FitSection(Section):
         cards = [self.card(head, *(self.figure(name, f"view {v}, {head}", f"view {v}")
                                    for v, name in enumerate(names))) for head, names in columns]
         return self.gallery(cards, wide=True) if len(cards) > 1 else None
+
+    def _values(self):
+        """Curves of scalars, and what they were at each snapshot."""
+        units = {s.text("name"): s.text("unit") for s in self.data.records("scalars")}
+        known = [(h.number("step") + 1, h.values.get("values") or {}) for h in self.history]
+        found = {name: [(step, values[name]) for step, values in known if name in values]
+                 for name in units}
+        found = {name: rows for name, rows in found.items() if rows}
+        if not found:
+            return None
+        heads = [f"{name} [{units[name]}]" if units[name] else name for name in found]
+        of_steps = {name: dict(rows) for name, rows in found.items()}
+        rows = [[count(s), *(figures(of_steps[n][s], 5) if s in of_steps[n] else "–" for n in found)]
+                for s in (snapshot.number("step") for snapshot in self.snapshots)]
+        few = dict(list(found.items())[:MOST_CURVES])
+        return join(element("h3", "Values"), charts.values_over_steps(self.palette, few),
+                    table(["step", *heads], rows, f"Values, {self.title}") if rows else None)
 
     def _distances(self):
         if not any(mesh.has("chamfer") for _, mesh in self.meshes):

@@ -40,7 +40,7 @@ READING = {
     "fit": [
         ("Loss",
          "Mean over views, pixels and channels, from two independent images of each view, so that"
-         " it is unbiased and may come out below zero near the target (such points are left out)."
+         " it is unbiased and may come out below zero near the target (such steps have a mark)."
          " Band: its standard error."),
         ("Distance to the truth",
          "Of points spread evenly over either surface to the nearest point of the other one: the"
