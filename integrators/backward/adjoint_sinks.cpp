@@ -70,10 +70,10 @@ void FilmPointAdjoint::add(const Rgb<double>& amount) {
 
 // With J the derivative of the film position of a point of the scene, the normal speed of the line
 // is n . J (v - v_ray).
-void FilmPointAdjoint::add_line(const FilmLineSample& line, const Rgb<double>& jump) {
+void FilmPointAdjoint::add_line(const FilmLineSample& line, const Rgb<double>& difference) {
   added_ = true;
   if (line.clip) {
-    add_clip(line, weighed(adjoint_, jump) * share_ / line.density);
+    add_clip(line, weighed(adjoint_, difference) * share_ / line.density);
     return;
   }
   const auto [a, b] = line.mesh->edge(line.edge.edge).vertices;
@@ -84,7 +84,7 @@ void FilmPointAdjoint::add_line(const FilmLineSample& line, const Rgb<double>& j
   form_ = &form;
   if (line.by.through) {
     form.add_edge(*line.mesh, line.edge, line.t, line.g);
-    add(jump);
+    add(difference);
     return;
   }
   Camera camera = motion_.scene().camera;
@@ -100,7 +100,7 @@ void FilmPointAdjoint::add_line(const FilmLineSample& line, const Rgb<double>& j
   Vec3d g;
   for (int k = 0; k < 3; ++k) g[k] = line.nx * at.x.d[k] + line.ny * at.y.d[k];
   form.add_edge(*line.mesh, line.edge, line.t, g);
-  add(jump);
+  add(difference);
 }
 
 namespace {

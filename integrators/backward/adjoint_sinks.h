@@ -50,7 +50,7 @@ class FilmPointAdjoint final : public FilmSink {
   bool at(const FilmPlace& place) override;
   bool takes(const BoundaryForm& form, const Rng& key) override;
   void add(const Rgb<double>& amount) override;
-  void add_line(const FilmLineSample& line, const Rgb<double>& jump) override;
+  void add_line(const FilmLineSample& line, const Rgb<double>& difference) override;
 
  private:
   void add_clip(const FilmLineSample& line, double weight);

@@ -27,15 +27,15 @@ class Runner {
   }
 
   // Adds a run to `to`. False if it did not come to its end.
-  bool run(DerivativeMethod& method, size_t rung, int repeat, ComparedMethod& to) {
-    const double time = options_.times[rung];
+  bool run(DerivativeMethod& method, size_t budget, int repeat, ComparedMethod& to) {
+    const double time = options_.times[budget];
     const double before = done_;
     done_ += time;
     RunSettings settings = settings_;
     settings.spp = kUnlimited;
     settings.seconds = time;
     settings.seed =
-        derived_seed(settings_.seed, fmt::format("{} {} {}", method.name(), rung, repeat));
+        derived_seed(settings_.seed, fmt::format("{} {} {}", method.name(), budget, repeat));
     if (settings_.progress) {
       settings.progress = [&](double done) { settings_.progress((before + done * time) / total_); };
     }
@@ -43,13 +43,13 @@ class Runner {
     MethodRun result = method.run(settings);
     if (stopped(settings_) || result.spp == 0) return false;
     if (result.peak_memory_bytes == 0) result.peak_memory_bytes = peak_memory_bytes();
-    add(method, {rung, repeat, settings.seed, std::move(result), {}}, to);
+    add(method, {budget, repeat, settings.seed, std::move(result), {}}, to);
     report();
     return true;
   }
 
-  void skip(size_t rung) {
-    done_ += options_.times[rung];
+  void skip(size_t budget) {
+    done_ += options_.times[budget];
     report();
   }
 
@@ -94,10 +94,10 @@ std::vector<std::pair<std::string, double>> mean_term_seconds(
   return means;
 }
 
-RungSummary summarize_rung(const std::vector<const ComparedRun*>& runs,
-                           const Reference& reference) {
-  RungSummary s;
-  s.rung = runs[0]->rung;
+BudgetSummary summarize_runs(const std::vector<const ComparedRun*>& runs,
+                             const Reference& reference) {
+  BudgetSummary s;
+  s.budget = runs[0]->budget;
   s.seconds = mean_of(collect(runs, [](const ComparedRun& r) { return r.run.seconds; }));
   s.setup_seconds =
       mean_of(collect(runs, [](const ComparedRun& r) { return r.run.setup_seconds; }));
@@ -118,35 +118,35 @@ RungSummary summarize_rung(const std::vector<const ComparedRun*>& runs,
   return s;
 }
 
-std::vector<const ComparedRun*> runs_of_rung(const ComparedMethod& method, size_t rung) {
+std::vector<const ComparedRun*> runs_within(const ComparedMethod& method, size_t budget) {
   std::vector<const ComparedRun*> runs;
   for (const ComparedRun& run : method.runs) {
-    if (run.rung == rung) runs.push_back(&run);
+    if (run.budget == budget) runs.push_back(&run);
   }
   return runs;
 }
 
 void summarize_method(const CompareOptions& options, const Reference& reference,
                       ComparedMethod& method) {
-  std::vector<Rung> ladder;
-  for (size_t rung = 0; rung < options.times.size(); ++rung) {
-    const auto runs = runs_of_rung(method, rung);
+  std::vector<TimedError> errors;
+  for (size_t budget = 0; budget < options.times.size(); ++budget) {
+    const auto runs = runs_within(method, budget);
     if (runs.empty()) continue;
-    method.summary.push_back(summarize_rung(runs, reference));
-    ladder.push_back({method.summary.back().seconds, method.summary.back().mse});
+    method.summary.push_back(summarize_runs(runs, reference));
+    errors.push_back({method.summary.back().seconds, method.summary.back().mse});
   }
-  method.slope = log_log_slope(ladder);
+  method.slope = log_log_slope(errors);
 }
 
-std::vector<double> error_times_seconds(const ComparedMethod& method, size_t rung) {
-  return collect(runs_of_rung(method, rung),
+std::vector<double> error_times_seconds(const ComparedMethod& method, size_t budget) {
+  return collect(runs_within(method, budget),
                  [](const ComparedRun& r) { return r.errors.mse * r.run.seconds; });
 }
 
-void find_time_ratio(const ComparedMethod& first, size_t rungs, ComparedMethod& method) {
-  for (size_t rung = rungs; rung-- > 0;) {
-    const auto ours = error_times_seconds(method, rung);
-    const auto theirs = error_times_seconds(first, rung);
+void find_time_ratio(const ComparedMethod& first, size_t budgets, ComparedMethod& method) {
+  for (size_t budget = budgets; budget-- > 0;) {
+    const auto ours = error_times_seconds(method, budget);
+    const auto theirs = error_times_seconds(first, budget);
     if (ours.empty() || theirs.empty()) continue;
     method.time_ratio = time_ratio(ours, theirs);
     if (method.time_ratio && &method == &first) method.time_ratio->error = 0;
@@ -182,13 +182,13 @@ std::vector<ComparedMethod> compare(const CompareOptions& options, const Referen
   }
   Runner runner(options, reference, methods.size(), settings);
   // Runs one; false if everything must end.
-  const auto run = [&](size_t m, size_t rung, int repeat) {
+  const auto run = [&](size_t m, size_t budget, int repeat) {
     if (results[m].status == MethodStatus::kMissing) {
-      runner.skip(rung);
+      runner.skip(budget);
       return true;
     }
     try {
-      return runner.run(*methods[m], rung, repeat, results[m]);
+      return runner.run(*methods[m], budget, repeat, results[m]);
     } catch (const MethodMissing& missing) {
       results[m].status = MethodStatus::kMissing;
       results[m].message = missing.what();
@@ -196,10 +196,10 @@ std::vector<ComparedMethod> compare(const CompareOptions& options, const Referen
     }
   };
   const auto run_all = [&] {
-    for (size_t rung = 0; rung < options.times.size(); ++rung) {
+    for (size_t budget = 0; budget < options.times.size(); ++budget) {
       for (int repeat = 0; repeat < options.repeats; ++repeat) {
         for (size_t m = 0; m < methods.size(); ++m) {
-          if (stopped(settings) || !run(m, rung, repeat)) return;
+          if (stopped(settings) || !run(m, budget, repeat)) return;
         }
       }
     }

@@ -115,13 +115,13 @@ double p_value(const ZSummary& summary) {
   return std::min(1.0, 2 * std::min(summary.p_chi_square, summary.p_largest));
 }
 
-std::optional<Uncertain> log_log_slope(const std::vector<Rung>& rungs) {
+std::optional<Uncertain> log_log_slope(const std::vector<TimedError>& runs) {
   std::vector<double> x, y, relative;
-  for (const Rung& rung : rungs) {
-    if (!(rung.error.value > 0)) continue;
-    x.push_back(std::log(rung.seconds));
-    y.push_back(std::log(rung.error.value));
-    relative.push_back(rung.error.error / rung.error.value);
+  for (const TimedError& run : runs) {
+    if (!(run.error.value > 0)) continue;
+    x.push_back(std::log(run.seconds));
+    y.push_back(std::log(run.error.value));
+    relative.push_back(run.error.error / run.error.value);
   }
   if (x.size() < 2) return std::nullopt;
   const double center = mean_of(x);

@@ -8,13 +8,13 @@
 namespace limn {
 namespace {
 
-using Place = std::array<double, 2>;
+using Pair = std::array<double, 2>;
 
-Place middle(const Place& a, const Place& b) { return {0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])}; }
+Pair middle(const Pair& a, const Pair& b) { return {0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])}; }
 
 // A point of the face: barycentric and texture coordinates.
 struct Point {
-  Place b, uv;
+  Pair b, uv;
 };
 using Part = std::array<Point, 3>;
 
@@ -27,7 +27,7 @@ class CurvedFace {
     turn_ = uv({1.0 / 3, 1.0 / 3})[angle_];
     for (int k = 0; k < 3; ++k) {
       const Vec3f& place = mesh.uv_places[mesh.uv_ids[face.index()][k]];
-      if (std::hypot(double{place.x}, double{place.y}) < 1e-6) pole_ = Place{kCorners[k]};
+      if (std::hypot(double{place.x}, double{place.y}) < 1e-6) pole_ = Pair{kCorners[k]};
     }
   }
 
@@ -39,10 +39,10 @@ class CurvedFace {
 
  private:
   static constexpr int kMostCuts = 5;
-  static constexpr Place kCorners[3] = {{0, 0}, {1, 0}, {0, 1}};
+  static constexpr Pair kCorners[3] = {{0, 0}, {1, 0}, {0, 1}};
 
-  Place uv(const Place& b) const { return texture_point<double>(mesh_, face_, b).uv; }
-  Point at(const Place& b) const {
+  Pair uv(const Pair& b) const { return texture_point<double>(mesh_, face_, b).uv; }
+  Point at(const Pair& b) const {
     Point point{b, uv(b)};
     point.uv[angle_] += std::round(turn_ - point.uv[angle_]);  // an angle goes on within the face
     return point;
@@ -74,8 +74,8 @@ class CurvedFace {
       return add_quarters(part, middles, cuts + 1);
     Texture::Jumps found;
     if (!texture_.add_jumps({part[0].uv, part[1].uv, part[2].uv}, most_, found)) return {};
-    const auto on_face = [&](const Place& at) {
-      Place b = part[0].b;
+    const auto on_face = [&](const Pair& at) {
+      Pair b = part[0].b;
       for (int c = 0; c < 2; ++c) {
         b[c] += at[0] * (part[1].b[c] - part[0].b[c]) + at[1] * (part[2].b[c] - part[0].b[c]);
       }
@@ -112,8 +112,8 @@ class CurvedFace {
   size_t most_;
   Texture::Jumps& jumps_;
   int angle_;
-  double turn_;                // of the middle
-  std::optional<Place> pole_;  // a corner on the axis
+  double turn_;               // of the middle
+  std::optional<Pair> pole_;  // a corner on the axis
 };
 
 }  // namespace
@@ -122,7 +122,7 @@ bool add_face_jumps(const Texture& texture, const Mesh& mesh, FaceId face, size_
                     Texture::Jumps& jumps) {
   if (mesh.uv_source != UvSource::kPlane) return CurvedFace(texture, mesh, face, most, jumps).add();
   const FaceIndices& ids = mesh.uv_ids[face.index()];
-  std::array<Place, 3> uv;
+  std::array<Pair, 3> uv;
   for (int k = 0; k < 3; ++k) {
     const Vec3f& place = mesh.uv_places[ids[k]];
     uv[k] = {place.x, place.y};

@@ -264,7 +264,7 @@ double price_of(const std::vector<TermFigures>& figures, const SampleCounts& cou
 Lanes survival_of(const TracedDraws& traced, double price, std::span<const double> units) {
   Lanes survival;
   if (!(price > 0) || traced.rays == 0) return survival;
-  const double squared = traced.squared_jumps / (price * static_cast<double>(traced.rays));
+  const double squared = traced.squared_difference / (price * static_cast<double>(traced.rays));
   for (size_t k = 0; k < units.size(); ++k) {
     survival[static_cast<int>(k)] =
         units[k] > 0 ? std::sqrt(squared / units[k]) : std::numeric_limits<double>::infinity();

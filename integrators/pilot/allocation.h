@@ -42,18 +42,19 @@ SampleCounts best_samples(const std::vector<TermFigures>& figures, double most =
 // pilot sees that too rarely in one cell, so the variance is the mean of those over 5 by 5 and 9 by
 // 9 cells, and a share is a quarter of the mean at least. Counts are whole; they are as small as
 // rounding allows.
-// The result is the price of work: how much of the squared error a unit of it is worth in the plan,
-// 0 if there is none. most: see best_samples; the mean over cells.
+// The result is the price of work, the Lagrange multiplier of the plan: how much of the squared
+// error a unit of work is worth in it, 0 if there is none. most: see best_samples; the mean over
+// cells.
 double spread_samples(const std::vector<TermFigures>& figures, const PlanGrid& grid,
                       SamplePlan& plan, double most = kNoLimit);
 
 // The same where all pixels have these counts.
 double price_of(const std::vector<TermFigures>& figures, const SampleCounts& counts);
 
-// See SamplePlan. What a draw of weight w adds to the squared error is (w j)^2, j its jump. Traced
-// with the probability p it adds (w j)^2 / p, for p of its rays' work: p = w j / sqrt(price work)
-// is best. Jumps and work are those of all draws, means of squares and of rays. units: of the
-// squared error of every parameter; where one is 0, all draws are traced.
+// See SamplePlan. A draw of weight w and radiance difference d adds (w d)^2 to the squared error.
+// Traced with the probability p it adds (w d)^2 / p, for p of its rays' work: p = w d / sqrt(price
+// work) is best. Differences and work are those of all draws, means of squares and of rays. units:
+// of the squared error of every parameter; where one is 0, all draws are traced.
 Lanes survival_of(const TracedDraws& traced, double price, std::span<const double> units);
 
 // Light samples of a path: what one of them adds to its variance, and what it costs.

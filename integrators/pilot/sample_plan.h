@@ -44,7 +44,7 @@ struct SamplePlan {
   int light_samples = 1;               // at every vertex of a path but the first
   std::vector<DirectionField> fields;  // by cell; empty: directions are held
   std::vector<FilmMotion> film;        // by cell: positions on the film; empty: they are held
-  // A draw of an edge that adds w times a jump of radiance to its pixel, in luminance, is traced
+  // A draw of an edge that adds w times a radiance difference to its pixel, in luminance, is traced
   // with the probability |survival w| (over parameters), see survival_of; zero: all are.
   Lanes survival{};
   // Whether vertices that move fast take more samples of edges and lights and more directions, and

@@ -117,7 +117,7 @@ class FilmSink : public BoundarySink {
  public:
   // The film position of the sample, before all else. False if no pixel asks for it.
   virtual bool at(const FilmPlace& place) = 0;
-  virtual void add_line(const FilmLineSample& line, const Rgb<double>& jump) = 0;
+  virtual void add_line(const FilmLineSample& line, const Rgb<double>& difference) = 0;
 };
 
 }  // namespace limn

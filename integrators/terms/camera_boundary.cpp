@@ -33,9 +33,9 @@ class CameraTerm final : public Term {
     if (!drawn || !sink.at(drawn->at)) return;
     const FilmEdgePoint& point = *drawn;
     RayCount rays;
-    Rgb<double> jump;
+    Rgb<double> difference;
     MirrorFaces by;
-    const bool visible = edges_->jump_at(point, key, rays, jump, by);
+    const bool visible = edges_->difference_at(point, key, rays, difference, by);
     sink.cost().add(rays);
     if (!visible) return;
     const FilmEdge& edge = point.edge;
@@ -50,7 +50,7 @@ class CameraTerm final : public Term {
     } else {
       line.clip = &edges_->clip_of(edge);
     }
-    sink.add_line(line, jump);
+    sink.add_line(line, difference);
   }
   void move_film(const FilmMotionAt& motion) override { edges_->move_film(motion); }
   void warn_of_kinks(const Scene& scene, std::vector<std::string>& warnings) const override {

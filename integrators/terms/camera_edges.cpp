@@ -216,7 +216,7 @@ void CameraEdges::add_pieces(uint32_t index, const FilmMotionAt& motion) {
   }
 }
 
-// Projected length times speed: exact but for the jump itself. Every parameter gets an equal
+// Projected length times speed: exact but for the difference itself. Every parameter gets an equal
 // share of the samples, whatever its unit.
 void CameraEdges::weigh(const FilmMotionAt& motion) {
   pieces_ = {};

@@ -10,7 +10,7 @@ namespace limn {
 class CameraEdges final : public FilmEdges {
  public:
   // As FilmEdges, with the speeds of tangents in `lanes` lanes. visible: of the film, to list only
-  // what is seen of edges; null: hidden parts are listed too, and found to be hidden by jump_at.
+  // what is seen of edges; null: hidden parts are listed too, which difference_at then finds.
   CameraEdges(const PathContext& context, const EdgeSamplerInput& input, int lanes,
               const FreeMotion* free = nullptr, const FilmRegions* visible = nullptr);
 

@@ -2,8 +2,8 @@
 // a region's cone are listed, and points on them drawn by what each would add.
 //   dL_o/dtheta  +=  sum over regions k of the sum over edges of
 //                    the integral over t of dL_k(t) f_s(w_t) J(t) dt
-// dL_k, the jump of what region k emits and p sees directly, is not zero but on outlines inside the
-// cone of directions around the region (those of the emitter itself are on its boundary). With
+// dL_k, the difference of what region k emits and p sees directly, is zero but on outlines inside
+// the cone of directions around the region (those of the emitter itself are on its boundary). With
 // weights W_i of the pieces i of these, W their sum, N points u_j = (j + xi) / N of the cumulated
 // weights, in the order of the list, estimate the sum: each piece is drawn N W_i / W times on
 // average. The order is the trees': points that follow each other lie near each other in the scene.

@@ -1,4 +1,4 @@
-// The jump of radiance across an edge: which faces lie on either side, and a path from each.
+// The radiance difference across an edge: which faces lie on either side, and a path from each.
 #include "integrators/terms/edge_difference.h"
 
 #include <algorithm>
@@ -138,7 +138,7 @@ class RadianceBeside {
     if (part_.regions) radiance_[i] = radiance_[i] - part_.regions->escaped(view_.omega);
   }
   // Throws as RayTracer does.
-  Rgb<double> jump() {
+  Rgb<double> difference() {
     path_.follow({going_, count_});
     for (int i = 0; i < 2; ++i) radiance_[i] = walks_[i].radiance() + radiance_[i];
     return radiance_[0] - radiance_[1];
@@ -198,7 +198,8 @@ bool start_beside_texture(const PathContext& context, const FacesAround& around,
 
 // What edge_difference finds where nothing at all may lie before the edge. ray: to it.
 bool difference_in_sight(const PathContext& context, const EdgeMesh& mesh, const EdgeView& view,
-                         Ray ray, const EdgeViewer& viewer, RayCount& rays, Rgb<double>& jump) {
+                         Ray ray, const EdgeViewer& viewer, RayCount& rays,
+                         Rgb<double>& difference) {
   const RadiancePart& part = viewer.part;
   if (view.distance > ray.t_max) return false;
   const FacesAround around = mesh.around(view.id.edge);
@@ -208,7 +209,7 @@ bool difference_in_sight(const PathContext& context, const EdgeMesh& mesh, const
   if (mesh.of_texture()) {
     const bool known = viewer.known_behind != nullptr;
     if (!start_beside_texture(context, around, view, ray, known, beside, rays)) return false;
-    jump = beside.jump();
+    difference = beside.difference();
     return true;
   }
   fetch_faces(context.scene, around);
@@ -244,7 +245,7 @@ bool difference_in_sight(const PathContext& context, const EdgeMesh& mesh, const
       beside.escape(i);
     }
   }
-  jump = beside.jump();
+  difference = beside.difference();
   return true;
 }
 
@@ -262,13 +263,13 @@ bool view_from(const Vec3d& p, EdgeView& view) {
 }  // namespace
 
 bool edge_difference(const PathContext& context, const EdgeMesh& mesh, const EdgeView& view,
-                     const EdgeViewer& viewer, RayCount& rays, Rgb<double>& jump) {
+                     const EdgeViewer& viewer, RayCount& rays, Rgb<double>& difference) {
   Ray ray{view.p, view.omega};
   ray.t_min = viewer.t_min;
   ray.t_max = viewer.t_max;
   ray.start = viewer.start;
   ray.skip_emitters = viewer.bounces == 0 && context.scene.hide_emitters;
-  if (difference_in_sight(context, mesh, view, ray, viewer, rays, jump)) return true;
+  if (difference_in_sight(context, mesh, view, ray, viewer, rays, difference)) return true;
   // What regions emit is seen directly alone, and is no part of what comes straight through.
   if (!context.straight_ways || viewer.part.region) return false;
   ray.skip_faces = mesh.around(view.id.edge).all;
@@ -281,8 +282,8 @@ bool edge_difference(const PathContext& context, const EdgeMesh& mesh, const Edg
     ray.start = way.start;
     ray.skip_faces = mesh.around(view.id.edge).all;
     const EdgeViewer straight{way.start, way.bounces, viewer.key};
-    if (difference_in_sight(context, mesh, beyond, ray, straight, rays, jump)) {
-      jump = jump * way.share;
+    if (difference_in_sight(context, mesh, beyond, ray, straight, rays, difference)) {
+      difference = difference * way.share;
       return true;
     }
   }

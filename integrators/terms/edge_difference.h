@@ -1,5 +1,5 @@
 #pragma once
-// The jump of incident radiance across an edge, as seen from a point.
+// The difference of incident radiance across an edge, as seen from a point.
 #include <limits>
 
 #include "integrators/lights/light_regions.h"
@@ -40,6 +40,6 @@ struct EdgeViewer {
 // for silhouettes, borders, sharp edges and edges of many faces. The unit directions and both faces
 // are exact, nothing is offset.
 bool edge_difference(const PathContext& context, const EdgeMesh& mesh, const EdgeView& view,
-                     const EdgeViewer& viewer, RayCount& rays, Rgb<double>& jump);
+                     const EdgeViewer& viewer, RayCount& rays, Rgb<double>& difference);
 
 }  // namespace limn

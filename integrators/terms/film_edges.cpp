@@ -1,4 +1,4 @@
-// Where edges lie on the film, and the jump of radiance there.
+// Where edges lie on the film, and the radiance difference there.
 #include "integrators/terms/film_edges.h"
 
 #include <limits>
@@ -190,17 +190,17 @@ Vec3d FilmEdges::viewer_of(const FilmEdgePoint& point, const FacesAround& around
   return y - along * (camera.depth(y) / dot(along, value(camera.forward)));
 }
 
-bool FilmEdges::jump_at(const FilmEdgePoint& point, const Rng& key, RayCount& rays,
-                        Rgb<double>& jump, MirrorFaces& by) const {
+bool FilmEdges::difference_at(const FilmEdgePoint& point, const Rng& key, RayCount& rays,
+                              Rgb<double>& difference, MirrorFaces& by) const {
   const FilmEdge& edge = point.edge;
-  if (edge.view != 0) return jump_beyond(point, key, rays, jump, by);
+  if (edge.view != 0) return difference_beyond(point, key, rays, difference, by);
   const double t = t_of(point);
   const Camera& camera = scene().camera;
   if (edge.clip != FilmEdge::kNoClip) {
     const ClipSegment& segment = clips_[edge.clip];
     const Vec3d a = value(segment.ends[0]), b = value(segment.ends[1]), y = a + (b - a) * t;
     const Vec3d from = CameraView<double>(camera).at(point.at.lens).start_of(y);
-    return clip_difference(context_, segment, from, y, key, rays, jump);
+    return clip_difference(context_, segment, from, y, key, rays, difference);
   }
   const EdgeMesh& mesh = input_.object(edge.id.object);
   const auto& ends = mesh.edge(edge.id.edge).vertices;
@@ -213,12 +213,12 @@ bool FilmEdges::jump_at(const FilmEdgePoint& point, const Rng& key, RayCount& ra
   return edge_difference(
       context_, mesh, view,
       {{}, 0, key, {}, known_behind, camera.near_clip / cosine, camera.far_clip / cosine}, rays,
-      jump);
+      difference);
 }
 
 // By way of mirrors the edge is where the camera's image sees it; rays tell what hides it.
-bool FilmEdges::jump_beyond(const FilmEdgePoint& point, const Rng& key, RayCount& rays,
-                            Rgb<double>& jump, MirrorFaces& by) const {
+bool FilmEdges::difference_beyond(const FilmEdgePoint& point, const Rng& key, RayCount& rays,
+                                  Rgb<double>& difference, MirrorFaces& by) const {
   const FilmEdge& edge = point.edge;
   const FilmView& view = views_[edge.view];
   const EdgeMesh& mesh = input_.object(edge.id.object);
@@ -243,8 +243,8 @@ bool FilmEdges::jump_beyond(const FilmEdgePoint& point, const Rng& key, RayCount
   EdgeView beyond;
   if (!view_edge(mesh, edge.id, t, sight.from, beyond)) return false;
   const EdgeViewer viewer{sight.last(), sight.bounces, key};
-  if (!edge_difference(context_, mesh, beyond, viewer, rays, jump)) return false;
-  jump = jump * sight.share;
+  if (!edge_difference(context_, mesh, beyond, viewer, rays, difference)) return false;
+  difference = difference * sight.share;
   by = sight.by;
   return true;
 }

@@ -83,8 +83,8 @@ class FilmEdges {
   // Where the point is on its edge, in space: (1 - t) of the edge's first end and t of the other.
   double t_of(const FilmEdgePoint& point) const;
   // dL there, and on which mirrors it is seen; false if it is hidden.
-  bool jump_at(const FilmEdgePoint& point, const Rng& key, RayCount& rays, Rgb<double>& jump,
-               MirrorFaces& by) const;
+  bool difference_at(const FilmEdgePoint& point, const Rng& key, RayCount& rays,
+                     Rgb<double>& difference, MirrorFaces& by) const;
 
  protected:
   const Scene& scene() const { return context_.scene; }
@@ -127,8 +127,8 @@ class FilmEdges {
   Vec3<Dual> moving(const Vec3d& x, const Vec3<Lanes>& velocity) const;
   bool place_ends(const Vec3<Dual>& x0, const Vec3<Dual>& x1, const Vec3d& side,
                   const CameraView<Dual>& view, FilmEdge& edge) const;
-  bool jump_beyond(const FilmEdgePoint& point, const Rng& key, RayCount& rays, Rgb<double>& jump,
-                   MirrorFaces& by) const;
+  bool difference_beyond(const FilmEdgePoint& point, const Rng& key, RayCount& rays,
+                         Rgb<double>& difference, MirrorFaces& by) const;
   // The point that sees y, a point of the edge; that of the camera's image, by way of mirrors.
   Vec3d viewer_of(const FilmEdgePoint& point, const FacesAround& around, const Vec3d& y) const;
 };

@@ -193,12 +193,12 @@ void FilmLanes::add(const Rgb<double>& amount) {
   sample_.along_y = amount * rate[1];
 }
 
-void FilmLanes::add_line(const FilmLineSample& line, const Rgb<double>& jump) {
+void FilmLanes::add_line(const FilmLineSample& line, const Rgb<double>& difference) {
   added_ = true;
   const Lanes speed = line.speed / line.density;
-  sample_.value = {speed * jump.r, speed * jump.g, speed * jump.b};
-  sample_.along_x = jump * (line.nx / line.density);
-  sample_.along_y = jump * (line.ny / line.density);
+  sample_.value = {speed * difference.r, speed * difference.g, speed * difference.b};
+  sample_.along_x = difference * (line.nx / line.density);
+  sample_.along_y = difference * (line.ny / line.density);
 }
 
 }  // namespace limn

@@ -19,11 +19,11 @@ struct TurnedVertex {
 struct TracedDraws {
   uint64_t count = 0, rays = 0;
   // For all channels, over the square of the luminance they are weighed by.
-  double squared_jumps = 0;
+  double squared_difference = 0;
   void add(const TracedDraws& other) {
     count += other.count;
     rays += other.rays;
-    squared_jumps += other.squared_jumps;
+    squared_difference += other.squared_difference;
   }
 };
 
@@ -85,7 +85,7 @@ class FilmLanes final : public FilmSink {
   bool at(const FilmPlace& place) override;
   bool takes(const BoundaryForm& form, const Rng& key) override;
   void add(const Rgb<double>& amount) override;
-  void add_line(const FilmLineSample& line, const Rgb<double>& jump) override;
+  void add_line(const FilmLineSample& line, const Rgb<double>& difference) override;
 
  private:
   const Scene& scene_;

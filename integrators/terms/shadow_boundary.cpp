@@ -201,7 +201,7 @@ void ShadowTerm::add_sample(const Viewer& viewer, const ShadowDraw& draw, const 
   const bool apart = distance > 0 && point->face != vertex.surface.start();
   const Rgb<double> f = apart ? vertex.scattered(omega) : Rgb<double>{};
   const Rgb<double> amount =
-      is_black(f) ? f : vertex.throughput * f * edges_.jump(edge, *point, q, omega);
+      is_black(f) ? f : vertex.throughput * f * edges_.difference(edge, *point, q, omega);
   BoundaryForm form;
   double by_pieces = draw.density;
   if (!is_black(amount)) {
@@ -254,7 +254,7 @@ void ShadowTerm::add_seen(double u, double share, const Rng& key, FilmSink& sink
       film_point(context_.scene, point->face, point->x, sample_lens(context_.scene.camera, key));
   if (!seen || !sink.at(seen->at)) return;
   const Vec3d q = value(seen->ray.origin);
-  const Rgb<double> amount = edges_.jump(edge, *point, q, seen->omega);
+  const Rgb<double> amount = edges_.difference(edge, *point, q, seen->omega);
   const double scale = film_per_solid_angle(context_.scene.camera, seen->omega, seen->distance) /
                        (edges_.probability(chosen) * share);
   if (is_black(amount)) return;
@@ -293,7 +293,7 @@ void ShadowTerm::add_line(double u, const Rng& key, FilmSink& sink) const {
   const double probability = edges_.probability(chosen);
   const double share = lines_.share(edge, probability, *point, *vertex);
   const double density = ShadowLines::kShare * probability * lines_.density(edge, *point, *vertex);
-  const Rgb<double> amount = f * edges_.jump(edge, *point, vertex->q, way);
+  const Rgb<double> amount = f * edges_.difference(edge, *point, vertex->q, way);
   if (is_black(amount) || !(density > 0)) return;
   BoundaryForm form = sweep(edge, *point, {way, distance}, share / density);
   form.x = vertex->q;

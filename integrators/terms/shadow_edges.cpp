@@ -222,8 +222,8 @@ std::optional<ShadowPoint> ShadowEdges::choose_crossing(const ShadowLine& line, 
                      at.side, share(received(at))};
 }
 
-Rgb<double> ShadowEdges::jump(const ShadowEdge& edge, const ShadowPoint& point, const Vec3d& q,
-                              const Vec3d& omega) const {
+Rgb<double> ShadowEdges::difference(const ShadowEdge& edge, const ShadowPoint& point,
+                                    const Vec3d& q, const Vec3d& omega) const {
   const Scene& scene = context_.scene;
   const auto surface = surface_on_ray<double>(scene, point.face, q, omega);
   const Scattering<double> scattering(surface, -omega, scene.shading);

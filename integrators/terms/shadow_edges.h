@@ -69,8 +69,8 @@ class ShadowEdges {
   std::optional<ShadowPoint> cast(const ShadowEdge& edge, double t, const Rng& key,
                                   RayCount& rays) const;
   // dL of the point as it is seen from q along the unit direction omega.
-  Rgb<double> jump(const ShadowEdge& edge, const ShadowPoint& point, const Vec3d& q,
-                   const Vec3d& omega) const;
+  Rgb<double> difference(const ShadowEdge& edge, const ShadowPoint& point, const Vec3d& q,
+                         const Vec3d& omega) const;
 
  private:
   std::optional<ShadowPoint> cast_on_face(const ShadowLine& line, FaceRef face,

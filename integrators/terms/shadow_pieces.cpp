@@ -46,11 +46,11 @@ LightSheet::LightSheet(const LightOrigin& origin, const Vec3d& y0, const Vec3d& 
     to_b_ = cross(normal_, w0_) * scale;
   }
   const double offset = dot(normal_, y0_);
-  const Place at = place({});
+  const OnSheet at = on_sheet({});
   bounds_ = {{{normal_, -offset}, {-normal_, offset}, {to_a_, at.a}, {to_b_, at.b}}};
 }
 
-LightSheet::Place LightSheet::place(const Vec3d& x) const {
+LightSheet::OnSheet LightSheet::on_sheet(const Vec3d& x) const {
   if (infinite_) {
     const double b = dot(to_b_, x - y0_);
     return {1 - b, b, dot(to_k_, x - y0_)};
@@ -60,7 +60,7 @@ LightSheet::Place LightSheet::place(const Vec3d& x) const {
 }
 
 std::optional<Stretch> LightSheet::cut(const std::array<Vec3d, 3>& corners, uint32_t label) const {
-  Place ends[2];
+  OnSheet ends[2];
   int count = 0;
   double sides[3];
   for (int i = 0; i < 3; ++i) sides[i] = dot(normal_, corners[i] - y0_);
@@ -68,7 +68,7 @@ std::optional<Stretch> LightSheet::cut(const std::array<Vec3d, 3>& corners, uint
     const int j = (i + 1) % 3;
     if ((sides[i] < 0) == (sides[j] < 0)) continue;
     const double s = sides[i] / (sides[i] - sides[j]);
-    ends[count++] = place(corners[i] + (corners[j] - corners[i]) * s);
+    ends[count++] = on_sheet(corners[i] + (corners[j] - corners[i]) * s);
   }
   if (count < 2) return {};
   double from = 0, to = 1;

@@ -34,10 +34,10 @@ class LightSheet {
 
  private:
   // In the sheet, but not yet divided: linear in space.
-  struct Place {
+  struct OnSheet {
     double a, b, k;  // t = b / (a + b)
   };
-  Place place(const Vec3d& x) const;
+  OnSheet on_sheet(const Vec3d& x) const;
 
   bool infinite_;
   Vec3d y0_, along_, w0_, w1_;

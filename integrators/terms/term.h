@@ -97,7 +97,7 @@ class Term {
   // What of it is the first sample's at each vertex alone, where each took one.
   virtual double first_work(const TermCost& /*cost*/) const { return 0; }
 
-  // Adds what to tell of kinks that the parameters move this term across.
+  // Adds warnings of kinks (non-differentiable points) that the parameters move this term across.
   virtual void warn_of_kinks(const Scene& /*scene*/, std::vector<std::string>& /*warnings*/) const {
   }
   // What the term built, for people to read.
@@ -159,20 +159,20 @@ class TermInput {
 struct TermType {
   const char* name;
   const char* description;
-  // The least number of samples in a sample of a pixel: whole numbers from 1 where they belong to
-  // paths, less than 1 where they belong to the film.
-  double least_samples;
-  // Paths are this term's samples, and what it takes to trace them is booked on it even if only
-  // others are computed. One row.
-  bool traces_paths;
-  bool edges;                  // it samples edges: rare events
-  bool moved_with_directions;  // its mean changes where directions move, see direction_field.h
-  int film_stream;             // tells the random numbers of terms on the film apart
+  std::unique_ptr<Term> (*make)(TermInput& input);
   bool (*applies)(const Scene& scene);  // whether the scene has anything that the term could be of
   bool (*changes)(const Moved& moved);  // whether it can differ from zero where this moves
-  bool regions;     // it is of samplers that keep regions of light apart, and of no others
-  bool moved_film;  // it is of methods that move positions on the film, and of no others
-  std::unique_ptr<Term> (*make)(TermInput& input);
+  // The least number of samples in a sample of a pixel: whole numbers from 1 where they belong to
+  // paths, less than 1 where they belong to the film.
+  double least_samples = 1;
+  // Paths are this term's samples, and what it takes to trace them is booked on it even if only
+  // others are computed. One row.
+  bool traces_paths = false;
+  bool edges = false;                  // it samples edges: rare events
+  bool moved_with_directions = false;  // its mean changes where directions move, direction_field.h
+  int film_stream = 0;                 // tells the random numbers of terms on the film apart
+  bool regions = false;     // it is of samplers that keep regions of light apart, and of no others
+  bool moved_film = false;  // it is of methods that move positions on the film, and of no others
 
   // None of its samples belongs to a path.
   bool on_film_alone() const { return least_samples < 1; }

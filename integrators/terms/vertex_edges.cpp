@@ -95,14 +95,15 @@ Ray leaving_by(const FlatMirrors& mirrors, const PathVertex& vertex, const Mirro
 
 // edge_difference() by way of mirrors, times what they reflect. form: gets the faces that do.
 bool mirrored_difference(const PathContext& context, const PathVertex& vertex, const EdgeDraw& draw,
-                         const Ray& ray, RayCount& rays, BoundaryForm& form, Rgb<double>& jump) {
+                         const Ray& ray, RayCount& rays, BoundaryForm& form,
+                         Rgb<double>& difference) {
   MirrorSight sight;
   if (!follow_mirrors(context, draw.way->chain, ray, vertex.bounces + 1, rays, sight)) return false;
   EdgeView view;
   if (!view_edge(draw.mesh, draw.sample.edge, draw.sample.t, sight.from, view)) return false;
   const EdgeViewer viewer{sight.last(), sight.bounces, draw.key, draw.part};
-  if (!edge_difference(context, draw.mesh, view, viewer, rays, jump)) return false;
-  jump = jump * sight.share;
+  if (!edge_difference(context, draw.mesh, view, viewer, rays, difference)) return false;
+  difference = difference * sight.share;
   form.by = sight.by;
   return true;
 }
@@ -135,12 +136,13 @@ void add_edge_point(const PathContext& context, const PathVertex& vertex, const 
     return;
   }
   RayCount rays;
-  Rgb<double> jump;
+  Rgb<double> difference;
   const EdgeViewer viewer{vertex.surface.start(), vertex.bounces + 1, draw.key, draw.part};
-  const bool visible = draw.way ? mirrored_difference(context, vertex, draw, ray, rays, form, jump)
-                                : edge_difference(context, draw.mesh, view, viewer, rays, jump);
+  const bool visible = draw.way
+                           ? mirrored_difference(context, vertex, draw, ray, rays, form, difference)
+                           : edge_difference(context, draw.mesh, view, viewer, rays, difference);
   cost.add(rays);
-  const Rgb<double> amount = visible ? scattered * jump : Rgb<double>{};
+  const Rgb<double> amount = visible ? scattered * difference : Rgb<double>{};
   if (draw.roulette) sink.traced(scattered, rays, amount);
   if (!visible) {
     ++cost.occluded;
@@ -149,7 +151,8 @@ void add_edge_point(const PathContext& context, const PathVertex& vertex, const 
   }
   ++cost.counted;
   if (sink.log()) {
-    sink.log()->push_back(fmt::format("    jump ({:.6g}, {:.6g}, {:.6g})", jump.r, jump.g, jump.b));
+    sink.log()->push_back(fmt::format("    radiance difference ({:.6g}, {:.6g}, {:.6g})",
+                                      difference.r, difference.g, difference.b));
   }
   sink.add(amount);
 }

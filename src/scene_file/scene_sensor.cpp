@@ -145,8 +145,7 @@ void read_sampler(const ObjectDescription& object, const SceneDescription& descr
   DescribedProperties p(object, description, kNoMakers);
   if (object.type != "independent") {
     warnings.push_back(format_warning(
-        object.where,
-        "sampler \"" + object.type + "\" is read as independent: --generator chooses"));
+        object.where, "sampler \"" + object.type + "\" is read as independent: generator chooses"));
     p.boolean("jitter", true);
     p.integer("strength", 2);
   }

@@ -119,8 +119,8 @@ class SceneBuilder {
     DescribedProperties p(object, description_, make_nested_);
     const std::vector<const ObjectDescription*> sensors = p.all_nested("sensor");
     if (p.nested("film")) {
-      warnings_.push_back(format_warning(
-          object.where, "batch: its film is not used: every sensor has its own (--sensor)"));
+      warnings_.push_back(
+          format_warning(object.where, "batch: its film is not used: every sensor has its own"));
     }
     p.nested("sampler");
     p.check_all_used();

@@ -185,7 +185,7 @@ TEST(Compare, InterleavesWithSeedsOfTheirOwn) {
     EXPECT_NEAR(results[m].summary[0].mse.value, error * error, 1e-12);
     EXPECT_NEAR(results[m].summary[1].mse.value, error * error / 2, 1e-12);
     EXPECT_NEAR(results[m].slope->value, -1, 1e-9);
-    EXPECT_NEAR(results[m].image[0], 1 + error / std::sqrt(2), 1e-12);  // the longest rung
+    EXPECT_NEAR(results[m].image[0], 1 + error / std::sqrt(2), 1e-12);  // the longest time
     EXPECT_EQ(std::get<double>(results[m].settings[0].value), 2);
   }
   EXPECT_NEAR(results[0].time_ratio->value, 1, 1e-12);

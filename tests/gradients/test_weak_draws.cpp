@@ -19,14 +19,14 @@ TEST(WeakDraws, AreTracedWhereItPays) {
   for (int i = 0; i < 5; ++i) traced.add({2, 7, 2 * rng.uniform()});
   const double price = 0.3, units[] = {0.5, 2};
   const Lanes survival = survival_of(traced, price, units);
-  const double squared_jump = traced.squared_jumps / static_cast<double>(traced.count);
+  const double squared_difference = traced.squared_difference / static_cast<double>(traced.count);
   const double rays = static_cast<double>(traced.rays) / static_cast<double>(traced.count);
   for (int lane = 0; lane < 2; ++lane) {
     for (const double weight : {0.01, 0.1, 0.5}) {
       const double best = survival[lane] * weight;
       ASSERT_LT(best, 1);
       const auto left = [&](double p) {
-        return weight * weight * squared_jump / units[lane] / p + price * rays * p;
+        return weight * weight * squared_difference / units[lane] / p + price * rays * p;
       };
       for (const double p : {0.9 * best, 1.1 * best}) EXPECT_LT(left(best), left(p));
     }

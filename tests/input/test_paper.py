@@ -43,11 +43,11 @@ def comparison(errors):
     methods = []
     for name in arguments[arguments.index("--methods") + 1].split(","):
         mse, stderr, trimmed, p = errors.get(name, [1, 0, 1, 0.5])
-        rung = dict(mse=mse, trimmed_mse=trimmed, relative_mse=mse / 8, seconds=2, spp=16, bias=dict(p=p))
+        budget = dict(mse=mse, trimmed_mse=trimmed, relative_mse=mse / 8, seconds=2, spp=16, bias=dict(p=p))
         runs = [dict(time=2.5, seconds=2, mse=mse + k * stderr, trimmed_mse=trimmed) for k in (-3 ** 0.5, 0, 3 ** 0.5)]
         runs.append(dict(time=1.25, seconds=1, mse=100, trimmed_mse=100))
         settings = dict(setup_not_counted_seconds=30.4) if name.startswith("mitsuba") else dict()
-        methods.append(dict(name=name, status="done", summary=[rung], runs=runs, settings=settings))
+        methods.append(dict(name=name, status="done", summary=[budget], runs=runs, settings=settings))
     return dict(methods=methods, times=[2.5], repeats=3, threads=2, width=64, height=64, command="limn compare ...",
                 reference=dict(seconds=12, method="adaptive"))
 if listed("fail"):

@@ -181,7 +181,7 @@ def test_check_and_compare_say_what_the_program_says(folder, scene):
     assert [m.name for m in comparison.methods] == ["adaptive", "fd"]
     assert comparison.reference.value.shape == (12, 16, 3) and comparison.reference.spp > 1
     for method in comparison.methods:
-        assert len(method.rungs) == 2 and method.rungs[1].mse[1] > 0 and method.message == ""
+        assert len(method.budgets) == 2 and method.budgets[1].mse[1] > 0 and method.message == ""
         assert method.image.shape == (12, 16, 3)
     assert comparison.methods[0].time_ratio[0] == pytest.approx(1)
 

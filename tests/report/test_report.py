@@ -253,8 +253,8 @@ class TestReport(unittest.TestCase):
     def test_undefined_numbers_are_dashes(self):
         def undefined(text):
             data = json.loads(text)
-            for rung in data["methods"][0]["summary"]:
-                rung.update(mse=None, mse_stderr=None, bias=None, rays=float("nan"))
+            for budget in data["methods"][0]["summary"]:
+                budget.update(mse=None, mse_stderr=None, bias=None, rays=float("nan"))
             data["methods"][1]["summary"][2]["mse"] = -1e-4
             return json.dumps(data)
 

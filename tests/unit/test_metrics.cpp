@@ -152,9 +152,9 @@ TEST(Bias, EqualBlocksWithoutVarianceSayNothing) {
 }
 
 TEST(Slope, OfAPowerLaw) {
-  std::vector<Rung> ladder;
-  for (const double t : {0.5, 1.0, 2.0, 4.0}) ladder.push_back({t, {3 / t, 0.3 / t}});
-  const auto slope = log_log_slope(ladder);
+  std::vector<TimedError> runs;
+  for (const double t : {0.5, 1.0, 2.0, 4.0}) runs.push_back({t, {3 / t, 0.3 / t}});
+  const auto slope = log_log_slope(runs);
   ASSERT_TRUE(slope);
   EXPECT_NEAR(slope->value, -1, 1e-12);
   // Two points: each moves the slope by its relative error over their distance.

@@ -26,8 +26,8 @@ constexpr int kImageSamples = 256;  // of the plain rendering, at most
 struct CompareArguments {
   std::string parameter;
   std::vector<std::string> methods;
-  double time = 0;  // seconds of a run, on the longest rung
-  int rungs = 1;    // of the ladder of times
+  double time = 0;  // seconds of a run, the longest budget
+  int budgets = 1;  // each half of the next
   int repeats = 4;
   std::string reference;         // "": made
   double reference_time = 0;     // 0: four times all runs of one method
@@ -81,8 +81,8 @@ void make_folder(const std::string& folder) {
 CompareOptions make_options(const CompareArguments& command) {
   CompareOptions options;
   options.repeats = command.repeats;
-  for (int rung = command.rungs; rung-- > 0;) {
-    options.times.push_back(std::ldexp(command.time, -rung));
+  for (int budget = command.budgets; budget-- > 0;) {
+    options.times.push_back(std::ldexp(command.time, -budget));
   }
   return options;
 }
@@ -287,7 +287,7 @@ void CompareCommand::add_options(CLI::App& app) {
       ->required()
       ->check(within(1e-6, 1e7))
       ->type_name("SECONDS");
-  app.add_option("--sweep", command_.rungs,
+  app.add_option("--sweep", command_.budgets,
                  "Measure error against time with N time budgets, each twice the one before, up to "
                  "--time (N is 5 if not given)")
       ->expected(0, 1)

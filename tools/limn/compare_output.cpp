@@ -47,7 +47,7 @@ std::string in_folder(const std::string& folder, const std::string& name) {
   return (std::filesystem::path(folder) / name).string();
 }
 
-// Attributes of the image that is shown: the first repeat of the longest rung.
+// Attributes of the image that is shown: the first repeat of the longest time.
 std::vector<ImageAttribute> image_attributes(const Scene& scene, const Comparison& c,
                                              const ComparedMethod& m) {
   const auto shown = std::find_if(m.runs.rbegin(), m.runs.rend(),
@@ -95,7 +95,7 @@ json or_null(Number value) {
 }
 
 json run_json(const ComparedRun& r, const std::vector<double>& times) {
-  return {{"time", times[r.rung]},
+  return {{"time", times[r.budget]},
           {"repeat", r.repeat},
           {"seconds", r.run.seconds},
           {"setup_seconds", r.run.setup_seconds},
@@ -117,8 +117,8 @@ json bias_json(const ZSummary& z) {
           {"p", p_value(z)}};
 }
 
-json summary_json(const RungSummary& s, const std::vector<double>& times) {
-  return {{"time", times[s.rung]},
+json summary_json(const BudgetSummary& s, const std::vector<double>& times) {
+  return {{"time", times[s.budget]},
           {"seconds", s.seconds},
           {"setup_seconds", s.setup_seconds},
           {"spp", s.spp},
@@ -157,7 +157,7 @@ json method_json(const ComparedMethod& m, const std::vector<double>& times) {
                  {"time_ratio", nullptr},
                  {"time_ratio_stderr", nullptr}};
   for (const ComparedRun& run : m.runs) object["runs"].push_back(run_json(run, times));
-  for (const RungSummary& s : m.summary) object["summary"].push_back(summary_json(s, times));
+  for (const BudgetSummary& s : m.summary) object["summary"].push_back(summary_json(s, times));
   if (m.slope) object["slope"] = {{"value", m.slope->value}, {"stderr", m.slope->error}};
   if (m.time_ratio) {
     object["time_ratio"] = m.time_ratio->value;
@@ -221,7 +221,7 @@ void write_csv(const std::string& file, const Comparison& c) {
   stream << ",peak_memory_bytes\n";
   for (const ComparedMethod& m : c.methods) {
     for (const ComparedRun& r : m.runs) {
-      stream << fmt::format("{},{},{},{},{},{},{},{},{},{},{}", m.name, c.options.times[r.rung],
+      stream << fmt::format("{},{},{},{},{},{},{},{},{},{},{}", m.name, c.options.times[r.budget],
                             r.repeat, r.seed, r.run.seconds, r.run.setup_seconds, r.run.spp,
                             r.run.rays, r.errors.mse, r.errors.relative_mse, r.errors.trimmed_mse);
       for (const std::string& name : names) {
@@ -243,7 +243,7 @@ std::string uncertain(const Uncertain& u) {
 }
 
 Table::Row row_of(const ComparedMethod& m) {
-  const RungSummary& s = m.summary.back();
+  const BudgetSummary& s = m.summary.back();
   const std::string bias =
       s.bias.count > 0 ? fmt::format("{:.2g} ({:.2g})", p_value(s.bias), s.bias.largest) : "-";
   return {m.name,
@@ -259,8 +259,8 @@ Table::Row row_of(const ComparedMethod& m) {
           m.slope ? uncertain(*m.slope) : "-"};
 }
 
-void add_method(const ComparedMethod& m, size_t rungs, Table& table) {
-  if (m.summary.empty() || m.summary.back().rung + 1 != rungs) {
+void add_method(const ComparedMethod& m, size_t budgets, Table& table) {
+  if (m.summary.empty() || m.summary.back().budget + 1 != budgets) {
     const bool missing = m.status == MethodStatus::kMissing;
     table.add_line(m.name + (missing ? " missing: " : ": ") + m.message);
     return;

@@ -27,7 +27,7 @@ struct Comparison {
 
 // Writes everything but the reference's EXRs into the folder, which exists.
 void write_comparison(const std::string& folder, const Scene& scene, const Comparison& comparison);
-// Prints the figures of the longest rung.
+// Prints the figures of the longest time.
 void print_comparison(const Comparison& comparison);
 
 }  // namespace limn

@@ -127,28 +127,28 @@ std::optional<std::pair<double, double>> to_pair(const std::optional<Uncertain>&
   return std::pair(value->value, value->error);
 }
 
-void bind_rung(nb::module_& m) {
-  nb::class_<RungSummary>(m, "Rung", "Over the repeats of a method in one time.")
-      .def_ro("seconds", &RungSummary::seconds, "Of a run, set-up included: a mean.")
-      .def_ro("spp", &RungSummary::spp, "Samples per pixel: a mean.")
+void bind_budget(nb::module_& m) {
+  nb::class_<BudgetSummary>(m, "TimeBudget", "Over the repeats of a method in one time.")
+      .def_ro("seconds", &BudgetSummary::seconds, "Of a run, set-up included: a mean.")
+      .def_ro("spp", &BudgetSummary::spp, "Samples per pixel: a mean.")
       .def_prop_ro(
-          "mse", [](const RungSummary& r) { return std::pair(r.mse.value, r.mse.error); },
+          "mse", [](const BudgetSummary& r) { return std::pair(r.mse.value, r.mse.error); },
           "Mean squared error over pixels and channels, and its standard error.")
       .def_prop_ro(
           "relative_mse",
-          [](const RungSummary& r) {
+          [](const BudgetSummary& r) {
             return std::pair(r.relative_mse.value, r.relative_mse.error);
           },
           "The same over the mean square of the reference.")
       .def_prop_ro(
-          "bias_p", [](const RungSummary& r) { return p_value(r.bias); },
+          "bias_p", [](const BudgetSummary& r) { return p_value(r.bias); },
           "p-value of the hypothesis that the method has no bias.");
 }
 
 }  // namespace
 
 void bind_compare(nb::module_& m) {
-  bind_rung(m);
+  bind_budget(m);
   nb::class_<MethodView>(m, "ComparedMethod", "A method in a comparison.")
       .def_prop_ro(
           "name", [](const MethodView& v) { return v.method.name; }, "Its name.")
@@ -156,8 +156,8 @@ void bind_compare(nb::module_& m) {
           "message", [](const MethodView& v) { return v.method.message; },
           "Why it is missing or not complete; \"\".")
       .def_prop_ro(
-          "rungs", [](const MethodView& v) { return v.method.summary; },
-          "One limn.Rung for each time.")
+          "budgets", [](const MethodView& v) { return v.method.summary; },
+          "One limn.TimeBudget for each time.")
       .def_prop_ro(
           "time_ratio", [](const MethodView& v) { return to_pair(v.method.time_ratio); },
           "Time for the error that the first method has after equal time, over this "

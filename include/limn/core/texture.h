@@ -69,7 +69,7 @@ class Texture : public TexelMap {
   // weighted sum is looked up.
   virtual TexelWeights texel_weights(const TexturePoint<double>& /*point*/) const { return {}; }
 
-  // Where `eval` jumps on a face.
+  // Where `eval` jumps (is discontinuous) on a face.
   struct Jump {
     std::array<double, 2> from, to;  // barycentric coordinates of the second and third corner
   };

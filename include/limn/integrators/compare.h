@@ -11,21 +11,21 @@
 namespace limn {
 
 struct CompareOptions {
-  std::vector<double> times;  // seconds of a run on each rung, ascending
+  std::vector<double> times;  // time budgets: seconds of a run, ascending
   int repeats = 4;
 };
 
 struct ComparedRun {
-  size_t rung = 0;  // index into the times
+  size_t budget = 0;  // index into the times
   int repeat = 0;
   uint64_t seed = 0;
   MethodRun run;  // the image is kept for the method's shown run only
   ImageErrors errors;
 };
 
-// Over the repeats of one rung.
-struct RungSummary {
-  size_t rung = 0;
+// Over the repeats of one budget.
+struct BudgetSummary {
+  size_t budget = 0;
   double seconds = 0, setup_seconds = 0, spp = 0, rays = 0;  // means
   Uncertain mse, relative_mse, trimmed_mse;
   ZSummary bias;  // count 0: unknown
@@ -41,16 +41,16 @@ struct ComparedMethod {
   std::string message;  // why it is missing or not complete
   std::vector<MethodSetting> settings;
   std::vector<ComparedRun> runs;
-  // The first repeat of the longest rung that has one; empty without runs.
+  // The first repeat of the longest budget that has one; empty without runs.
   std::vector<double> image;
-  std::vector<RungSummary> summary;  // of the rungs with a run
+  std::vector<BudgetSummary> summary;  // of the budgets with a run
   std::optional<Uncertain> slope;
-  // Time for the error that the first method has after equal time, over that method's, on the
-  // longest rung that both have.
+  // Time for the error that the first method has after equal time, over that method's, with the
+  // longest budget that both have.
   std::optional<Uncertain> time_ratio;
 };
 
-// reference: of at least two batches. Runs are interleaved: for every rung, for every repeat, for
+// reference: of at least two batches. Runs are interleaved: for every time, for every repeat, for
 // every method; each with a seed of its own. settings: threads, seed, progress over all runs,
 // interruption; samples and seconds do not count. Interrupted, the result holds all runs that were
 // finished.

@@ -55,14 +55,13 @@ std::vector<double> bias_scores(const std::vector<BlockSums>& repeats, const Blo
 // Two-sided p-value of a whole set of scores: the smaller of summarize()'s two, doubled.
 double p_value(const ZSummary& summary);
 
-// Slope of log error over log seconds, by least squares over the rungs of a ladder; its error from
-// those of the rungs. Rungs with an error of zero or below are left out; none if fewer than two
-// are left.
-struct Rung {
+// Slope of log error over log seconds, by least squares over runs; its error from those of
+// the runs. Those with an error of zero or below are left out; none if fewer than two are left.
+struct TimedError {
   double seconds = 0;
   Uncertain error;
 };
-std::optional<Uncertain> log_log_slope(const std::vector<Rung>& rungs);
+std::optional<Uncertain> log_log_slope(const std::vector<TimedError>& runs);
 
 // error * seconds of runs: what stays the same as a run gets longer. The ratio of the means is the
 // time that `method` needs for the same error over the time that `baseline` needs. None unless both
