@@ -238,7 +238,6 @@ TEST(Includes, OneDoorPerThirdParty) {
       {"libjpeg", std::regex("^(jpeglib|jerror).*")},
       {"zlib", std::regex("^zlib.*")},
       {"pugixml", std::regex("^pugixml.*")},
-      {"tinyobjloader", std::regex("^tiny_obj_loader.*")},
       {"TBB", std::regex("^(oneapi/)?tbb/.*")},
       {"OpenMesh", std::regex("^OpenMesh/.*")},
       {"CLP", std::regex("^(coin/|Clp|Coin).*")},
@@ -251,8 +250,7 @@ TEST(Includes, OneDoorPerThirdParty) {
       }
     }
   }
-  for (const char* library :
-       {"Embree", "OpenEXR", "libjpeg", "libpng", "pugixml", "TBB", "tinyobjloader", "zlib"}) {
+  for (const char* library : {"Embree", "OpenEXR", "libjpeg", "libpng", "pugixml", "TBB", "zlib"}) {
     ASSERT_EQ(doors[library].size(), 1u) << library;
   }
   for (const auto& [library, files] : doors) {
