@@ -32,15 +32,19 @@ class BackwardCommand final : public Command {
     app_ = &app;
     add_common_options(app, common_);
     auto* adjoint =
-        app.add_option("--adjoint", adjoint_, "Image of dLoss/dpixel (.exr), in place of --target");
-    auto* target = app.add_option("--target", target_, "Image with which the loss compares (.exr)");
+        app.add_option("--adjoint", adjoint_, "Image of dLoss/dpixel (.exr), in place of --target")
+            ->type_name("FILE");
+    auto* target = app.add_option("--target", target_, "Image with which the loss compares (.exr)")
+                       ->type_name("FILE");
     adjoint->excludes(target);
     const OptionAdder add(app);
     visit_options(loss_, all_but({"method", "points"}, add));
     for (const char* name : {"--loss", "--pyramid"}) app.get_option(name)->needs(target);
     app.add_option("--wrt", options_.parameters,
                    "Parameter, a scalar or an array such as SHAPE.vertex_positions (repeatable; "
-                   "default: all parameters except displacements)");
+                   "default: all parameters except displacements)")
+        ->type_name("PARAM")
+        ->allow_extra_args(false);
     visit_options(options_, add);
     add_time_option(app, common_);
     app.add_flag("--loss-only", loss_only_,
@@ -48,7 +52,8 @@ class BackwardCommand final : public Command {
                  "--adjoint)")
         ->needs(target);
     app.add_option("-o,--output", output_, "Folder for the results (created if missing)")
-        ->required();
+        ->required()
+        ->type_name("FOLDER");
     add_part_option(app, common_);
     app.get_option("--part")->excludes("--time");
     add_debug_option(app, debug_);

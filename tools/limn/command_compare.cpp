@@ -289,7 +289,7 @@ void CompareCommand::add_options(CLI::App& app) {
       ->type_name("SECONDS");
   app.add_option("--sweep", command_.budgets,
                  "Measure error against time with N time budgets, each twice the one before, up to "
-                 "--time (N is 5 if not given)")
+                 "--time (N is 5 if not given; without --sweep there is one budget)")
       ->expected(0, 1)
       ->default_str("5")
       ->check(within(1, 30))
@@ -312,7 +312,8 @@ void CompareCommand::add_options(CLI::App& app) {
   app.add_option("-o,--output", command_.output, "Folder for images, report and results")
       ->required()
       ->type_name("FOLDER");
-  app.add_flag("!--no-report", command_.report, "Write no report.html");
+  app.add_flag_callback(
+      "--no-report", [this] { command_.report = false; }, "Write no report.html");
 }
 
 int CompareCommand::run_images(const std::string& command_line) {

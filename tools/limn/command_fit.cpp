@@ -111,8 +111,10 @@ void FitCommand::add_options(CLI::App& app) {
          "--snapshots", given_.snapshots,
          "Steps between snapshots of meshes, images and state (default: ten snapshots in all)")
       ->check(within(1, 1 << 30));
-  app.add_option("--truth", truth_, "True mesh (.obj, .ply); distances to it are reported");
-  app.add_option("-o,--output", output_, "Folder for the results (created if missing)");
+  app.add_option("--truth", truth_, "True mesh (.obj, .ply); distances to it are reported")
+      ->type_name("MESH");
+  app.add_option("-o,--output", output_, "Folder for the results (created if missing)")
+      ->type_name("FOLDER");
   app.add_option("--resume", resume_,
                  "Continue the fit in this folder with the same results as one run. Allows only "
                  "--steps, --threads, --quiet and --no-report")

@@ -136,7 +136,8 @@ class GradientCommand final : public Command {
     app.add_option("-o,--output", output_,
                    "Derivative image to write (.exr); _stderr.exr and .png are written beside it. "
                    "With several --wrt each name gets a suffix")
-        ->required();
+        ->required()
+        ->type_name("FILE");
     app.add_flag("--sample-images", sample_images_,
                  "Also write the samples of each term per pixel sample to OUTPUT_samples_TERM.exr");
     app.add_flag("--stats", stats_,

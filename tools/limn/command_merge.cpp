@@ -22,9 +22,11 @@ class MergeCommand final : public Command {
         ->required()
         ->type_name("PART...");
     app.add_option("-o,--output", output_, "Output of the run, as -o of its command without --part")
-        ->required();
-    app.add_option("--json", json_, "Write all results as JSON to this file");
-    app.add_option("--threads", threads_, "Number of threads for the set-up (default: all cores)");
+        ->required()
+        ->type_name("FILE|FOLDER");
+    app.add_option("--json", json_, "Write all results as JSON to this file")->type_name("FILE");
+    app.add_option("--threads", threads_, "Number of threads for the set-up (default: all cores)")
+        ->type_name("INT");
     app.add_flag("--quiet", quiet_, "Print only errors and warnings");
   }
 

@@ -23,7 +23,8 @@ class RenderCommand final : public Command {
     app_ = &app;
     add_common_options(app, common_);
     app.add_option("-o,--output", output_, "Image to write (.exr); a .png is written beside it")
-        ->required();
+        ->required()
+        ->type_name("FILE");
     options_.generator = kGenerators[0];
     const OptionAdder add(app);
     visit_options(options_, all_but({"what"}, add));

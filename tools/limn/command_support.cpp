@@ -66,7 +66,8 @@ void add_common_options(CLI::App& app, CommonOptions& common) {
                  "Sensor to render: its id, or its number from 0 (default: the first)")
       ->type_name("ID|NUMBER");
   visit_options(common.run, only("spp", OptionAdder(app)));
-  app.add_option("--json", common.json, "Write all results as JSON to this file");
+  app.add_option("--json", common.json, "Write all results as JSON to this file")
+      ->type_name("FILE");
   app.add_option("--shading", common.shading,
                  "Shading with interpolated normals: continuous, or as in Mitsuba 3, whose shading "
                  "has discontinuities that gradients miss")

@@ -29,7 +29,8 @@ void add_reject_options(CLI::App& app, RejectCommand& command) {
   // Those whose rejection differs.
   command.methods = {"forest", "quadric", "quadric:quadrics=off", "li2019"};
   app.add_option("-o,--output", command.output, "Folder for pictures, figures and report")
-      ->required();
+      ->required()
+      ->type_name("FOLDER");
   app.add_option("--methods", command.methods,
                  "Edge samplers to examine; the first one's tree chooses the node")
       ->delimiter(',')
@@ -65,7 +66,8 @@ void add_reject_options(CLI::App& app, RejectCommand& command) {
          "Points around the mesh from which acceptance rates and counts by depth are measured")
       ->check(within(2, 1 << 24))
       ->capture_default_str();
-  app.add_flag("!--no-report", command.report, "Write no report.html");
+  app.add_flag_callback(
+      "--no-report", [&] { command.report = false; }, "Write no report.html");
 }
 
 }  // namespace limn
