@@ -1,5 +1,5 @@
 #pragma once
-// Where the textures of a scene jump: inside of faces, and at edges of meshes.
+// Where the textures of a scene jump (are discontinuous): inside of faces, and at edges of meshes.
 #include <span>
 #include <string>
 #include <vector>
