@@ -334,17 +334,14 @@ class Rejection {
         {"colors", colors_json()},
         {"chart", chart_json()},
         {"status", is_done() ? "done" : "interrupted"}};
-    const std::vector<RejectVariant> all = variants();
-    for (const RejectVariant& variant : all) report["variants"].push_back(to_json(variant));
+    for (const RejectVariant& v : variants()) report["variants"].push_back(to_json(v));
     write_json(file("reject.json"), report.dump(2));
-    write_json(file("reject.csv"), summary_csv(all));
-    write_json(file("reject_by_depth.csv"), depth_csv(all));
   }
 
   void print() const {
     fmt::print("{}: {} edges; node {} of {}, at depth {}, has {}\n", common_.scene,
                mesh().edges.size(), node_, types_[0].name, node_depth_, node_edges_.size());
-    print_tables(variants());
+    print_table(variants());
   }
 
   int status() const {

@@ -1,6 +1,7 @@
-// The figures of limn reject as JSON, CSV and tables.
+// The figures of limn reject as JSON and as a table.
 #include "tools/limn/reject/reject_figures.h"
 #include "tools/limn/output_files.h"
+#include "tools/limn/table.h"
 
 #include <fmt/format.h>
 
@@ -55,46 +56,6 @@ json depths_json(const ReachCounts& counts) {
   return depths;
 }
 
-void print_summary(std::span<const RejectVariant> variants) {
-  constexpr const char* kHead =
-      "\n{:<16} {:>6} {:>23} {:>23} {:>25} {:>8}\n"
-      "{:<16} {:>6} {:>7} {:>7} {:>7} {:>7} {:>7} {:>7} {:>8} {:>7} {:>8} {:>8}  {}\n";
-  fmt::print(kHead, "", "node's", "slice 0 (%)", "slice 1 (%)", "one point: edges", "reached/",
-             "method", "edges", "reject", "accept", "false", "reject", "accept", "false", "silhou.",
-             "false", "positive", "silhou.", "acceptance rate");
-  for (const RejectVariant& v : variants) {
-    fmt::print("{:<16} {:>6}", v.name, v.node.end - v.node.begin);
-    for (const VerdictCounts& counts : v.slices)
-      for (const NodeVerdict verdict :
-           {NodeVerdict::kTrueReject, NodeVerdict::kTrueAccept, NodeVerdict::kFalseAccept})
-        fmt::print(" {:7.2f}", 100 * share(of(counts, verdict), points_of(counts)));
-    fmt::print(" {:>8} {:>7} {:>8} {:8.2f}  {:.4f} +- {:.4f}\n", v.reach.silhouettes.size(),
-               v.reach.false_accepts.size(), v.reach.false_positives.size(),
-               reached_per_silhouette(v.counts), v.hits.mean, v.hits.standard_error);
-  }
-}
-
-void print_depths(std::span<const RejectVariant> variants) {
-  size_t depths = 0;
-  fmt::print("\nfalse accepts per point (share of the nodes accepted)\n{:>5}", "depth");
-  for (const RejectVariant& v : variants) {
-    fmt::print(" {:>18}", v.name);
-    depths = std::max(depths, v.counts.by_depth.size());
-  }
-  for (size_t d = 0; d < depths; ++d) {
-    fmt::print("\n{:>5}", d + 1);
-    for (const RejectVariant& v : variants) {
-      const bool any = d < v.counts.by_depth.size();
-      const DepthCounts counts = any ? v.counts.by_depth[d] : DepthCounts{};
-      fmt::print(" {:>18}", any ? fmt::format("{:.1f} ({:4.1f} %)",
-                                              share(counts.false_accepts, v.counts.points),
-                                              100 * share(counts.false_accepts, counts.accepted))
-                                : "");
-    }
-  }
-  fmt::print("\n");
-}
-
 }  // namespace
 
 uint64_t RejectVariant::missed() const {
@@ -130,38 +91,33 @@ json to_json(const RejectVariant& v) {
           {"by_depth", depths_json(v.counts)}};
 }
 
-std::string summary_csv(std::span<const RejectVariant> variants) {
-  std::string text =
-      "variant,node_edges,node_overlap,slice,true_reject,true_accept,false_accept,missed,hit_rate,"
-      "hit_rate_stderr,reached_per_silhouette,silhouettes,false_accepts,false_positive_edges\n";
+void print_table(std::span<const RejectVariant> variants) {
+  Table table({{"method", true},
+               {"node's edges"},
+               {"rejected"},
+               {"accepted"},
+               {"false positives"},
+               {"reached silhouettes"},
+               {"others"},
+               {"reached per silhouette"},
+               {"acceptance rate"}});
   for (const RejectVariant& v : variants) {
-    for (size_t i = 0; i < v.slices.size(); ++i) {
-      const VerdictCounts& c = v.slices[i];
-      text += fmt::format("{},{},{:.6g},{},{},{:.6g},{:.3g},{:.6g},{},{},{}\n", v.name,
-                          v.node.end - v.node.begin, v.match.overlap, i, fmt::join(c, ","),
-                          v.hits.mean, v.hits.standard_error, reached_per_silhouette(v.counts),
-                          v.reach.silhouettes.size(), v.reach.false_accepts.size(),
-                          v.reach.false_positives.size());
+    Table::Row row{v.name, std::to_string(v.node.end - v.node.begin)};
+    VerdictCounts sum{};  // of both slices
+    for (const VerdictCounts& slice : v.slices) {
+      for (size_t k = 0; k < sum.size(); ++k) sum[k] += slice[k];
     }
-  }
-  return text;
-}
-
-std::string depth_csv(std::span<const RejectVariant> variants) {
-  std::string text = "variant,depth,nodes_tested,accepted,false_accepts,missed\n";
-  for (const RejectVariant& v : variants) {
-    for (size_t d = 0; d < v.counts.by_depth.size(); ++d) {
-      const DepthCounts& c = v.counts.by_depth[d];
-      text += fmt::format("{},{},{},{},{},{}\n", v.name, d + 1, c.tested, c.accepted,
-                          c.false_accepts, c.missed);
+    for (const NodeVerdict verdict :
+         {NodeVerdict::kTrueReject, NodeVerdict::kTrueAccept, NodeVerdict::kFalseAccept}) {
+      row.push_back(fmt::format("{:.2f} %", 100 * share(of(sum, verdict), points_of(sum))));
     }
+    row.push_back(std::to_string(v.reach.silhouettes.size()));
+    row.push_back(std::to_string(v.reach.false_accepts.size()));
+    row.push_back(fmt::format("{:.2f}", reached_per_silhouette(v.counts)));
+    row.push_back(fmt::format("{:.4f} +- {:.4f}", v.hits.mean, v.hits.standard_error));
+    table.add(std::move(row));
   }
-  return text;
-}
-
-void print_tables(std::span<const RejectVariant> variants) {
-  print_summary(variants);
-  print_depths(variants);
+  fmt::print("\n{}", table.text());
 }
 
 }  // namespace limn

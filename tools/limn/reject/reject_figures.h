@@ -27,11 +27,7 @@ std::string slice_file(const std::string& variant, size_t slice);
 std::string edges_file(const std::string& variant);
 
 nlohmann::json to_json(const RejectVariant& variant);
-// One row per variant and slice, with a header.
-std::string summary_csv(std::span<const RejectVariant> variants);
-// One row per variant and depth, with a header.
-std::string depth_csv(std::span<const RejectVariant> variants);
-// Prints the tables to standard output.
-void print_tables(std::span<const RejectVariant> variants);
+// Prints a row per variant to standard output.
+void print_table(std::span<const RejectVariant> variants);
 
 }  // namespace limn
