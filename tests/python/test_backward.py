@@ -47,10 +47,10 @@ def test_reverse_dotted_with_a_motion_is_forward(scene, adjoint):
 
 
 def run_program(folder, *words):
-    """The output's folder, and what is in its report."""
+    """The output's folder, and what is in its report. The scene may follow any option."""
     output = folder / "backward"
-    subprocess.run([os.environ["LIMN_PROGRAM"], "backward", str(folder / "scene.xml"), "--quiet",
-                    "-o", str(output), *words], check=True)
+    subprocess.run([os.environ["LIMN_PROGRAM"], "backward", "--quiet", "-o", str(output), *words,
+                    str(folder / "scene.xml")], check=True)
     return output, json.loads((output / "gradient.json").read_text())
 
 
@@ -70,9 +70,9 @@ def test_it_has_the_programs_bits(folder, scene, adjoint, threads):
     target = np.asarray(limn.render(scene, spp=16, seed=4)) * np.float32(1.5)
     limn.write_exr(folder / "target.exr", target)
     output, told = run_program(folder, "--target", str(folder / "target.exr"), "--loss",
-                               "relative-l2", "--spp", "4", "--wrt", POSITIONS, "--terms",
+                               "relative-l2", "--spp", "4", "--terms",
                                "interior,boundary", "--pixels", "uniform", "--edge-samples", "2",
-                               "--method", "uniform")
+                               "--method", "uniform", "--wrt", POSITIONS)
     loss = limn.image_loss(scene, target, "relative-l2", spp=4, threads=threads)
     assert (loss.value, loss.stderr) == (told["loss"]["value"], told["loss"]["stderr"])
     found = limn.backward(scene, loss.adjoint, POSITIONS, spp=4, terms=["interior", "boundary"],
