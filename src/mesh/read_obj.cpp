@@ -1,11 +1,17 @@
-// Wavefront OBJ. Every word of a vertex, a normal and a face is read: what a parser skips in silence
-// is a surface that is missing. Polygons are split here, in linear time.
+// Wavefront OBJ, parsed by tinyobjloader: this file is the one door to it. A check in front of it
+// reads every word of a vertex, a normal and a face: what a parser skips in silence is a surface
+// that is missing. Polygons are split here, in linear time.
+#define TINYOBJLOADER_IMPLEMENTATION
+#define TINYOBJLOADER_USE_DOUBLE
 #include <fmt/format.h>
+#include <tiny_obj_loader.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
+#include <span>
+#include <sstream>
 
 #include "limn/core/names.h"
 #include "src/base/text.h"
@@ -92,7 +98,7 @@ class ObjWords {
   Position where_;
 };
 
-// Vertices, texture coordinates or normals, and what faces ask of them.
+// Vertices, texture coordinates and normals, and what faces ask of them.
 struct Elements {
   const char* name;
   size_t count = 0;
@@ -100,14 +106,16 @@ struct Elements {
   ObjWords::Position place;
 };
 
-constexpr size_t kMostElements = std::numeric_limits<int>::max();  // not tuned
+// Of tinyobjloader's indices.
+constexpr size_t kMostElements = std::numeric_limits<int>::max();
 
-class ObjReader {
+// What the check leaves for the parser: lines with v, vn, vt and f alone, none continued, all of
+// them sound; and where the faces stand in the file.
+class ObjCheck {
  public:
-  ObjReader(const std::string& file, const std::string& text) : words_(file, text) {
-    mesh_.where = {file};
+  ObjCheck(const std::string& file, const std::string& text) : words_(file, text) {
     while (!words_.at_end()) {
-      read_statement(words_.next());
+      check_statement(words_.next());
       words_.skip_line();
     }
     for (const Elements* e : {&vertices_, &textures_, &normals_}) {
@@ -117,33 +125,31 @@ class ObjReader {
     }
   }
 
-  RawMesh take_mesh() {
-    complete_uv();
-    split_faces();
-    return std::move(mesh_);
-  }
+  std::string take_lines() { return std::move(lines_); }
+  const std::vector<ObjWords::Position>& faces() const { return faces_; }
+  const ObjWords& words() const { return words_; }
+  // The first vertex beyond kLargestCoordinate; SIZE_MAX if there is none.
+  size_t far_position() const { return far_position_; }
+  SourceLocation far_where() const { return words_.location(far_place_); }
 
  private:
-  void read_statement(std::string_view keyword) {
+  void check_statement(std::string_view keyword) {
     if (keyword == "v") {
-      read_position();
+      check_position();
       count(vertices_);
     } else if (keyword == "vn") {
-      const std::vector<double>& n = read_numbers("normal", 3, 3);
+      const std::vector<double>& n = check_numbers("normal", 3, 3);
       // Normals that are not finite are not used: zero is such a one.
-      const bool finite = std::isfinite(n[0] + n[1] + n[2]);
-      mesh_.normals.push_back(finite ? Vec3d{n[0], n[1], n[2]} : Vec3d{});
+      lines_ += "vn" + (std::isfinite(n[0] + n[1] + n[2]) ? rest_ : " 0 0 0") + "\n";
       count(normals_);
     } else if (keyword == "vt") {
-      const std::vector<double>& uv = read_numbers("texture coordinate", 1, 3);
-      const double u = uv[0], v = uv.size() < 2 ? 0 : uv[1];
-      // What is so far off is refused where it is used.
-      const bool finite = std::isfinite(u) && std::isfinite(v);
-      mesh_.uv_places.push_back(finite ? Vec3f{static_cast<float>(u), static_cast<float>(v), 0}
-                                       : Vec3f{1e38f, 1e38f, 0});
+      const std::vector<double>& uv = check_numbers("texture coordinate", 1, 3);
+      const bool finite = std::isfinite(uv[0]) && (uv.size() < 2 || std::isfinite(uv[1]));
+      // The parser would read others as 0; what is so far off is refused where it is used.
+      lines_ += "vt" + (finite ? rest_ : " 1e38 1e38") + "\n";
       count(textures_);
     } else if (keyword == "f") {
-      read_face();
+      check_face();
     } else if (!keyword.empty() &&
                std::find(kSkipped.begin(), kSkipped.end(), keyword) == kSkipped.end()) {
       std::vector<std::string> known = kSkipped;
@@ -161,14 +167,16 @@ class ObjReader {
     if (++of.count > kMostElements) words_.fail("more of a kind than 2147483647: split the file");
   }
 
-  // The numbers of the rest of the line, as many as that.
-  const std::vector<double>& read_numbers(const std::string& what, size_t least, size_t most) {
+  // The numbers of the rest of the line, as many as that; their words in rest_.
+  const std::vector<double>& check_numbers(const std::string& what, size_t least, size_t most) {
     numbers_.clear();
+    rest_.clear();
     for (std::string_view word = words_.next(); !word.empty(); word = words_.next()) {
       const std::optional<double> number = parse_double(word);
       if (!number) words_.fail("not a number: \"" + std::string(word) + "\"");
       if (numbers_.size() == most) words_.fail(fmt::format("{}: more than {} numbers", what, most));
       numbers_.push_back(*number);
+      (rest_ += ' ') += word;
     }
     if (numbers_.size() < least) {
       words_.fail(fmt::format("{} needs {} numbers, not {}", what, least, numbers_.size()));
@@ -177,37 +185,37 @@ class ObjReader {
   }
 
   // x y z, then a weight, a colour, or both, which nothing here uses.
-  void read_position() {
+  void check_position() {
     const ObjWords::Position begin = words_.where();
-    const std::vector<double>& n = read_numbers("vertex", 3, 7);
+    const std::vector<double>& n = check_numbers("vertex", 3, 7);
     if (n.size() == 5) words_.fail(begin, "vertex: 5 numbers are neither x y z w nor x y z r g b");
     for (const double v : n) {
       if (!std::isfinite(v)) words_.fail(begin, "vertex is not finite");
       if (std::fabs(v) > std::numeric_limits<float>::max()) {
         words_.fail(begin, "vertex: a number is beyond a float's range (3.4e38)");
       }
-      if (std::fabs(v) > kLargestCoordinate && mesh_.far_position == SIZE_MAX) {
-        mesh_.far_position = vertices_.count;
-        mesh_.far_where = words_.location(begin);
+      if (std::fabs(v) > kLargestCoordinate && far_position_ == SIZE_MAX) {
+        far_position_ = vertices_.count;
+        far_place_ = begin;
       }
     }
-    mesh_.positions.push_back({n[0], n[1], n[2]});
+    lines_ += "v" + rest_ + "\n";
   }
 
-  void read_face() {
+  void check_face() {
     faces_.push_back(words_.where());
-    for (std::string_view word = words_.next(); !word.empty(); word = words_.next()) {
-      read_corner(word);
+    lines_ += 'f';
+    int corners = 0;
+    for (std::string_view word = words_.next(); !word.empty(); word = words_.next(), ++corners) {
+      check_corner(word);
+      (lines_ += ' ') += word;
     }
-    const size_t before = ends_.back();
-    ends_.push_back(corners_[0].size());
-    if (ends_.back() - before < 3) {
-      words_.fail(faces_.back(), "a face needs at least three corners");
-    }
+    lines_ += '\n';
+    if (corners < 3) words_.fail(faces_.back(), "a face needs at least three corners");
   }
 
   // v, v/vt, v//vn or v/vt/vn.
-  void read_corner(std::string_view word) {
+  void check_corner(std::string_view word) {
     std::array<std::string_view, 3> parts;
     size_t last = 0;
     for (std::string_view rest = word;; ++last) {
@@ -216,15 +224,14 @@ class ObjReader {
       if (slash == rest.size()) break;
       rest.remove_prefix(slash + 1);
     }
-    corners_[0].push_back(read_index(word, parts[0], vertices_));
-    const bool has_uv = last == 1 || !parts[1].empty();
-    corners_[1].push_back(has_uv ? read_index(word, parts[1], textures_) : kNone);
-    corners_[2].push_back(last == 2 ? read_index(word, parts[2], normals_) : kNone);
+    check_index(word, parts[0], vertices_);
+    if (last == 1 || !parts[1].empty()) check_index(word, parts[1], textures_);
+    if (last == 2) check_index(word, parts[2], normals_);
   }
 
-  // From zero. Indices count from 1 and may point ahead (checked at the end), or, if negative,
-  // backwards from the latest element.
-  uint32_t read_index(std::string_view word, std::string_view part, Elements& of) {
+  // Indices count from 1 and may point ahead (checked at the end), or, if negative, backwards from
+  // the latest element.
+  void check_index(std::string_view word, std::string_view part, Elements& of) {
     const std::optional<int64_t> number = parse_integer(part);
     const auto refers = [&](const std::string& what) {
       words_.fail(fmt::format("a face refers to {} {}, but {}", of.name, *number, what));
@@ -234,65 +241,97 @@ class ObjReader {
           fmt::format("a corner is v, v/vt, v//vn or v/vt/vn in whole numbers, not \"{}\"", word));
     }
     if (*number == 0) refers("they count from 1");
-    const auto count = static_cast<int64_t>(of.count);
-    if (*number < -count) refers(fmt::format("there are {} before it", count));
-    if (*number < 0) return static_cast<uint32_t>(count + *number);
-    if (*number > of.largest) {
-      of.largest = *number;
-      of.place = words_.where();
+    if (*number < -static_cast<int64_t>(of.count)) {
+      refers(fmt::format("there are {} before it", of.count));
     }
-    return static_cast<uint32_t>(*number - 1);
+    if (*number <= of.largest) return;
+    of.largest = *number;
+    of.place = words_.where();
   }
-
-  // Corners without texture coordinates have (0, 0) where others have some, as in Mitsuba.
-  void complete_uv() {
-    std::vector<uint32_t>& uvs = corners_[1];
-    if (std::all_of(uvs.begin(), uvs.end(), [](uint32_t t) { return t == kNone; })) {
-      mesh_.uv_places.clear();
-      return;
-    }
-    mesh_.uv_source = UvSource::kPlane;
-    const auto none = static_cast<uint32_t>(mesh_.uv_places.size());
-    mesh_.uv_places.push_back({});
-    for (uint32_t& t : uvs) t = std::min(t, none);
-  }
-
-  void split_faces() {
-    const auto& [vertices, uvs, normals] = corners_;
-    const bool has_normals =
-        std::any_of(normals.begin(), normals.end(), [](uint32_t n) { return n != kNone; });
-    std::vector<Vec3d> points;
-    for (size_t f = 0; f + 1 < ends_.size(); ++f) {
-      points.clear();
-      for (size_t i = ends_[f]; i < ends_[f + 1]; ++i) {
-        points.push_back(mesh_.positions[vertices[i]]);
-      }
-      const auto triangles = split_polygon(points);
-      if (triangles.empty()) {
-        words_.fail(faces_[f], fmt::format("a concave face of {} corners (at most {}): split it",
-                                           points.size(), kMaxConcaveCorners));
-      }
-      for (const auto& t : triangles) {
-        const auto picked = [&, first = ends_[f]](const std::vector<uint32_t>& from) {
-          return FaceIndices{from[first + t[0]], from[first + t[1]], from[first + t[2]]};
-        };
-        mesh_.faces.push_back(picked(vertices));
-        if (has_normals) mesh_.normal_ids.push_back(picked(normals));
-        if (!mesh_.uv_places.empty()) mesh_.uv_ids.push_back(picked(uvs));
-      }
-    }
-  }
-
-  static constexpr uint32_t kNone = kNoNormal;
 
   ObjWords words_;
   Elements vertices_{"vertex", 0, 0, {}}, textures_{"texture coordinate", 0, 0, {}},
       normals_{"normal", 0, 0, {}};
   std::vector<double> numbers_;  // of the line at hand
-  RawMesh mesh_;
-  std::vector<ObjWords::Position> faces_;         // where they stand
-  std::array<std::vector<uint32_t>, 3> corners_;  // vertices, texture coordinates, normals
-  std::vector<size_t> ends_{0};                   // of each face's corners
+  std::string rest_, lines_;
+  std::vector<ObjWords::Position> faces_;
+  size_t far_position_ = SIZE_MAX;
+  ObjWords::Position far_place_;
+};
+
+// What the parser calls back with: elements as they come, faces with all their corners.
+struct Parsed {
+  RawMesh mesh;
+  std::vector<uint32_t> vertices, normals, uvs;  // of all corners
+  std::vector<size_t> ends{0};                   // of each face's corners
+
+  static constexpr uint32_t kNoUv = UINT32_MAX;
+
+  static uint32_t from_zero(int index, size_t count) {
+    return static_cast<uint32_t>(index > 0 ? index - 1 : static_cast<int64_t>(count) + index);
+  }
+  static Parsed& of(void* parsed) { return *static_cast<Parsed*>(parsed); }
+  static tinyobj::callback_t callbacks() {
+    tinyobj::callback_t calls;
+    calls.vertex_cb = [](void* to, double x, double y, double z, double) {
+      of(to).mesh.positions.push_back({x, y, z});
+    };
+    calls.normal_cb = [](void* to, double x, double y, double z) {
+      of(to).mesh.normals.push_back({x, y, z});
+    };
+    calls.texcoord_cb = [](void* to, double u, double v, double) {
+      of(to).mesh.uv_places.push_back({static_cast<float>(u), static_cast<float>(v), 0});
+    };
+    calls.index_cb = [](void* to, tinyobj::index_t* corners, int count) {
+      Parsed& p = of(to);
+      for (const tinyobj::index_t& c : std::span(corners, static_cast<size_t>(count))) {
+        p.vertices.push_back(from_zero(c.vertex_index, p.mesh.positions.size()));
+        p.normals.push_back(c.normal_index == 0 ? kNoNormal
+                                                : from_zero(c.normal_index, p.mesh.normals.size()));
+        p.uvs.push_back(
+            c.texcoord_index == 0 ? kNoUv : from_zero(c.texcoord_index, p.mesh.uv_places.size()));
+      }
+      p.ends.push_back(p.vertices.size());
+    };
+    return calls;
+  }
+
+  // Corners without texture coordinates have (0, 0) where others have some, as in Mitsuba.
+  void complete_uv() {
+    if (std::all_of(uvs.begin(), uvs.end(), [](uint32_t t) { return t == kNoUv; })) {
+      mesh.uv_places.clear();
+      return;
+    }
+    mesh.uv_source = UvSource::kPlane;
+    const auto none = static_cast<uint32_t>(mesh.uv_places.size());
+    mesh.uv_places.push_back({});
+    for (uint32_t& t : uvs) t = std::min(t, none);
+  }
+
+  void split_faces(const ObjCheck& check) {
+    complete_uv();
+    const bool has_normals =
+        std::any_of(normals.begin(), normals.end(), [](uint32_t n) { return n != kNoNormal; });
+    std::vector<Vec3d> corners;
+    for (size_t f = 0; f + 1 < ends.size(); ++f) {
+      corners.clear();
+      for (size_t i = ends[f]; i < ends[f + 1]; ++i) corners.push_back(mesh.positions[vertices[i]]);
+      const auto triangles = split_polygon(corners);
+      if (triangles.empty()) {
+        check.words().fail(check.faces()[f],
+                           fmt::format("a concave face of {} corners (at most {}): split it",
+                                       corners.size(), kMaxConcaveCorners));
+      }
+      for (const auto& t : triangles) {
+        const auto picked = [&, first = ends[f]](const std::vector<uint32_t>& from) {
+          return FaceIndices{from[first + t[0]], from[first + t[1]], from[first + t[2]]};
+        };
+        mesh.faces.push_back(picked(vertices));
+        if (has_normals) mesh.normal_ids.push_back(picked(normals));
+        if (!mesh.uv_places.empty()) mesh.uv_ids.push_back(picked(uvs));
+      }
+    }
+  }
 };
 
 }  // namespace
@@ -300,7 +339,17 @@ class ObjReader {
 RawMesh parse_obj(const std::string& file) {
   const std::optional<std::string> text = read_whole_file(file);
   if (!text) throw InputError({file}, "cannot read the file");
-  return ObjReader(file, *text).take_mesh();
+  ObjCheck check(file, *text);
+  Parsed parsed;
+  std::istringstream lines(check.take_lines());
+  if (!tinyobj::LoadObjWithCallback(lines, Parsed::callbacks(), &parsed)) {
+    throw InputError({file}, "cannot be parsed");
+  }
+  parsed.mesh.where = {file};
+  parsed.mesh.far_position = check.far_position();
+  if (check.far_position() != SIZE_MAX) parsed.mesh.far_where = check.far_where();
+  parsed.split_faces(check);
+  return std::move(parsed.mesh);
 }
 
 }  // namespace limn

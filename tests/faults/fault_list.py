@@ -209,7 +209,7 @@ FAULTS = [
           "  largest.square = number();\n", "  largest.squares = number();\n",
           "test_program", "Parts.*"),
     Fault("readers", "negative OBJ indices off by one", "src/mesh/read_obj.cpp",
-          "static_cast<uint32_t>(count + *number);", "static_cast<uint32_t>(count + *number - 1);",
+          "static_cast<int64_t>(count) + index);", "static_cast<int64_t>(count) + index - 1);",
           "test_mesh"),
     Fault("readers", "beam width", "src/light/spot.cpp",
           "0.75 * cutoff", "0.7 * cutoff", "test_lights", "DeltaLights.*"),

@@ -238,6 +238,7 @@ TEST(Includes, OneDoorPerThirdParty) {
       {"libjpeg", std::regex("^(jpeglib|jerror).*")},
       {"zlib", std::regex("^zlib.*")},
       {"pugixml", std::regex("^pugixml.*")},
+      {"tinyobjloader", std::regex("^tiny_obj_loader.*")},
       {"TBB", std::regex("^(oneapi/)?tbb/.*")},
       {"OpenMesh", std::regex("^OpenMesh/.*")},
       {"CLP", std::regex("^(coin/|Clp|Coin).*")},
@@ -250,7 +251,8 @@ TEST(Includes, OneDoorPerThirdParty) {
       }
     }
   }
-  for (const char* library : {"Embree", "OpenEXR", "libjpeg", "libpng", "pugixml", "TBB", "zlib"}) {
+  for (const char* library :
+       {"Embree", "OpenEXR", "libjpeg", "libpng", "pugixml", "TBB", "tinyobjloader", "zlib"}) {
     ASSERT_EQ(doors[library].size(), 1u) << library;
   }
   for (const auto& [library, files] : doors) {
