@@ -29,6 +29,25 @@ struct Step {
 
 double mean_variance(const Moments& moments) { return mean_of(variances(moments)); }
 
+struct Change {
+  double squared, error;  // as in StepTrial
+};
+
+// Pixels are taken for independent.
+Change squared_change(const Moments& change) {
+  double sum = 0, squares = 0;
+  const auto pixels = static_cast<double>(change.size()) / 3;
+  for (size_t i = 0; i + 2 < change.size(); i += 3) {
+    double of_pixel = 0;
+    for (size_t c = i; c < i + 3; ++c)
+      of_pixel += (change.mean(c) * change.mean(c) - change.variance(c)) / 3;
+    sum += of_pixel;
+    squares += of_pixel * of_pixel;
+  }
+  const double mean = sum / pixels;
+  return {mean, std::sqrt(std::max(squares / pixels - mean * mean, 0.0) / pixels)};
+}
+
 // The differences at every step, and what changes from each to the next.
 std::vector<std::vector<double>> steps_and_changes() {
   std::vector<std::vector<double>> combinations(2 * kTrials - 1, std::vector<double>(kTrials));
@@ -63,10 +82,10 @@ Step find_step(const Scene& scene, const Parameter& parameter, size_t parameters
   if (r.spp < kPilotSamples) return {parameter.natural_step, "interrupted"};
   std::vector<StepTrial> trials;
   for (int k = 0; k < kTrials; ++k) {
-    const Moments& change = r.estimates[0][kTrials + std::max(k - 1, 0)].total;
+    const Change change = squared_change(r.estimates[0][kTrials + std::max(k - 1, 0)].total);
     trials.push_back({job.steps[k],
                       mean_variance(r.estimates[0][k].total) * static_cast<double>(r.spp),
-                      mean_square(means(change)) - mean_variance(change)});
+                      change.squared, change.error});
   }
   extrapolate_variances(trials);
   // A run makes two images a sample and parameter, the pilot 2 kTrials.
@@ -154,11 +173,15 @@ double best_step(std::span<const StepTrial> trials, double samples) {
   std::vector<double> biases, errors;  // squared
   for (size_t k = 0; k < trials.size(); ++k) {
     // b (h^2 - (h / factor)^2) changes, b h^2 is the bias.
-    const double change = std::max(0.0, trials[std::max<size_t>(k, 1)].squared_change);
+    const StepTrial& trial = trials[std::max<size_t>(k, 1)];
+    const double change = std::max(0.0, trial.squared_change) + trial.change_error;
     const double scale = square / (square - 1) / (k == 0 ? square : 1);
     biases.push_back(change * scale * scale);
-    errors.push_back(biases[k] + trials[k].variance / std::max(1.0, samples));
   }
+  for (size_t k = trials.size() - 1; k-- > 0;)
+    biases[k] = std::min(biases[k], biases[k + 1] / square);
+  for (size_t k = 0; k < trials.size(); ++k)
+    errors.push_back(biases[k] + trials[k].variance / std::max(1.0, samples));
   const auto least = std::min_element(errors.begin(), errors.end());
   const auto k = static_cast<size_t>(least - errors.begin());
   if (k == 0 || k + 1 == trials.size()) return trials[k].step;

@@ -9,6 +9,7 @@ struct StepTrial {
   double step = 0;            // h
   double variance = 0;        // of one sample
   double squared_change = 0;  // of (D_h - D of the next smaller step)^2, minus its own variance
+  double change_error = 0;    // standard error of squared_change
 };
 // Raises the variance at every step to what the larger ones lead to expect: at a small step a short
 // pilot meets no edge and sees no variance, which grows as 1 / h. trials: by ascending step.
@@ -17,7 +18,9 @@ void extrapolate_variances(std::span<StepTrial> trials);
 // The step of least expected squared error with that many samples. trials: by ascending step, each
 // the same factor times the one before; the squared change of the first is not used. The bias
 // grows with h^2, which gives the squared bias of a step from its change, and that of the first
-// from the second's; around the best trial the variance is taken for a power of h.
+// from the second's; around the best trial the variance is taken for a power of h. A change is
+// taken for its error more than was found: a short pilot cannot tell it from none. Its square falls
+// as h^2 at least, whatever was found.
 double best_step(std::span<const StepTrial> trials, double samples);
 
 // The samples per pixel of a run that takes `per_second` and has `left` seconds behind its pilot,
