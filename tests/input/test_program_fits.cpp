@@ -31,6 +31,12 @@ TEST_F(Program, FitsAndGoesOn) {
   };
   EXPECT_GT(bytes(whole + "/state.cbor").size(), 100u);
   EXPECT_EQ(bytes(whole + "/state.cbor"), bytes(broken + "/state.cbor"));
+  for (const char* steps : {"", " --steps 2"}) {
+    const Outcome more = run("fit --no-report --resume " + broken + steps);
+    EXPECT_NE(more.text.find("4 steps are done, and --steps asks for "), std::string::npos)
+        << more.text;
+  }
+  EXPECT_EQ(bytes(whole + "/state.cbor"), bytes(broken + "/state.cbor"));
   EXPECT_EQ(bytes(whole + "/step_00004_screen.ply"), bytes(broken + "/step_00004_screen.ply"));
   const json a = json::parse(bytes(whole + "/fit.json"));
   const json b = json::parse(bytes(broken + "/fit.json"));

@@ -15,6 +15,7 @@
 #include "tools/limn/fit_folder.h"
 #include "tools/limn/folder_lock.h"
 #include "tools/limn/report_script.h"
+#include "tools/limn/terminal.h"
 
 namespace limn {
 namespace {
@@ -280,7 +281,12 @@ int FitCommand::run(const std::string&) {
 int FitCommand::loop(Fit& fit, FitFolder& folder, const RunSettings& settings) {
   const FitArguments& a = folder.arguments();
   if (fit.steps() == 0) folder.add_snapshot(fit, settings, kPictureSamples, common_.quiet);
-  if (folder.at_rest(fit)) fmt::print(stderr, "the fit has converged: no step is left to take\n");
+  if (folder.at_rest(fit)) {
+    fmt::print(stderr, "the fit has converged: no step is left to take\n");
+  } else if (fit.steps() >= a.steps) {
+    fmt::print(stderr, "{} steps are done, and --steps asks for {}: give more to go on\n",
+               fit.steps(), a.steps);
+  }
   while (fit.steps() < a.steps && !folder.at_rest(fit)) {
     std::optional<FitRecord> record;
     try {
@@ -293,6 +299,7 @@ int FitCommand::loop(Fit& fit, FitFolder& folder, const RunSettings& settings) {
     if (!record) {
       folder.add_snapshot(fit, settings, 0, common_.quiet);
       folder.write(fit, "interrupted", warnings_.lines());
+      clear_progress();
       fmt::print(stderr, "interrupted: {} of {} steps are done; limn fit --resume {} goes on\n",
                  fit.steps(), a.steps, folder.name());
       return kInterrupted;
@@ -309,6 +316,7 @@ int FitCommand::loop(Fit& fit, FitFolder& folder, const RunSettings& settings) {
 
 void FitCommand::tell(const FitRecord& record) const {
   if (common_.quiet) return;
+  if (record.at_rest || record.halvings > 0 || record.remeshed) clear_progress();
   if (record.at_rest) {
     fmt::print("step {}: converged, no lower loss was found along the gradient\n", record.step);
   }

@@ -17,6 +17,7 @@
 #include "limn/integrators/render.h"
 #include "tools/limn/command_support.h"
 #include "tools/limn/table.h"
+#include "tools/limn/terminal.h"
 
 // Vectors as a list of their numbers.
 template <class T>
@@ -370,6 +371,11 @@ void FitFolder::print_snapshot(const Fit& fit, const json& meshes) {
     if (!mesh.contains("chamfer")) continue;
     add("chamfer / diagonal", 0, figure(mesh, "chamfer", FMT_STRING("{:.4f}")));
     add("normals [degrees]", 0, figure(mesh, "normal_angle", FMT_STRING("{:.1f}")));
+  }
+  clear_progress();
+  if (!told_negative_ && !history_.empty() && history_.back().at("loss").get<double>() < 0) {
+    fmt::print("the loss is an unbiased estimate: near zero, noise takes single ones below it\n");
+    told_negative_ = true;
   }
   const Table table(columns);
   const std::string headings = table.heading_line();

@@ -81,6 +81,7 @@ class FitFolder {
 
   std::string folder_;
   std::string headings_;  // that were printed last
+  bool told_negative_ = false;
   FitArguments arguments_;
   nlohmann::json history_ = nlohmann::json::array(), snapshots_ = nlohmann::json::array();
 };

@@ -16,7 +16,8 @@ namespace limn {
 namespace {
 
 std::atomic<bool> g_interrupted{false};
-std::atomic<int64_t> g_first{0};  // when it was set [ns]
+std::atomic<int64_t> g_first{0};   // when it was set [ns]
+std::atomic<bool> g_drawn{false};  // a line of progress that has no end yet
 
 // `timeout` and job schedulers send a process its signal, and then to its group, it among them:
 // what comes at once is one request.
@@ -52,6 +53,18 @@ void watch_interrupt() {
   if (std::signal(SIGHUP, on_interrupt) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);
 }
 
+std::string progress_line(const std::string& label, double done, double spent) {
+  const std::string line = fmt::format("{}: {:3.0f} %", label, 100 * done);
+  if (done < 0.01 || (spent < 3 && done < 1)) return line;
+  return line + fmt::format(", {} left", duration(spent * (1 - done) / done));
+}
+
+void clear_progress() {
+  if (!g_drawn.exchange(false)) return;
+  fmt::print(stderr, "\r\033[K");
+  std::fflush(stderr);
+}
+
 std::function<void(double)> progress_bar(const std::string& label, bool quiet) {
   if (quiet || !isatty(STDERR_FILENO)) return nullptr;
   using Clock = std::chrono::steady_clock;
@@ -62,9 +75,9 @@ std::function<void(double)> progress_bar(const std::string& label, bool quiet) {
     if (done < 1 && now - *drawn < std::chrono::milliseconds(200)) return;
     *drawn = now;
     const double spent = std::chrono::duration<double>(now - start).count();
-    fmt::print(stderr, "\r{}: {:3.0f} %, {} left   {}", label, 100 * done,
-               duration(spent * (1 - done) / done), done < 1 ? "" : "\n");
+    fmt::print(stderr, "\r{}\033[K{}", progress_line(label, done, spent), done < 1 ? "" : "\n");
     std::fflush(stderr);
+    g_drawn.store(done < 1);
   };
 }
 
