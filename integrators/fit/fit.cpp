@@ -7,7 +7,6 @@
 #include <cmath>
 
 #include "integrators/fit/fit_impl.h"
-#include "integrators/fit/remesh.h"
 #include "integrators/methods/faces_estimator.h"
 #include "integrators/methods/hair_gaps.h"
 #include "integrators/methods/selection.h"
@@ -16,6 +15,7 @@
 #include "limn/core/rng.h"
 #include "limn/integrators/methods.h"
 #include "limn/integrators/options.h"
+#include "limn/integrators/remesh.h"
 
 namespace limn {
 

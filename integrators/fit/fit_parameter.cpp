@@ -7,10 +7,10 @@
 #include <cmath>
 #include <limits>
 
-#include "integrators/fit/remesh.h"
 #include "integrators/fit/surface_tree.h"
 #include "limn/core/check.h"
 #include "limn/core/error.h"
+#include "limn/integrators/remesh.h"
 
 namespace limn {
 

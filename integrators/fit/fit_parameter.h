@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "integrators/fit/large_steps.h"
 #include "integrators/fit/optimiser.h"
 #include "limn/core/parameter.h"
 #include "limn/integrators/fit.h"
+#include "limn/integrators/large_steps.h"
 
 namespace limn {
 

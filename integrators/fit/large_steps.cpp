@@ -1,5 +1,5 @@
 // Smooth steps of vertices: the sparse matrix I + lambda L and its Cholesky factors.
-#include "integrators/fit/large_steps.h"
+#include "limn/integrators/large_steps.h"
 
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>

@@ -1,5 +1,5 @@
 // Isotropic remeshing on OpenMesh's half-edges: the one door to that library.
-#include "integrators/fit/remesh.h"
+#include "limn/integrators/remesh.h"
 
 #include "limn/core/error.h"
 

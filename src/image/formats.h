@@ -14,6 +14,10 @@ StoredImage read_jpeg(const std::string& file, std::string_view data);
 StoredImage read_png(const std::string& file, std::string_view data);
 StoredImage read_rgbe(const std::string& file, std::string_view data);
 
+// The alpha channel, as read_alpha() has it. Errors as above.
+Image read_png_alpha(const std::string& file, std::string_view data);
+Image read_exr_alpha(const std::string& file);
+
 // InputError if a size of the header cannot be: at most kMaxPixels pixels, of which a byte of the
 // file yields at most `pixels_per_byte`, and memory for that many bytes a pixel.
 void check_image_size(const std::string& file, std::string_view data, uint64_t width,

@@ -23,6 +23,7 @@
 #include "limn/core/image_layers.h"
 #include "limn/core/memory.h"
 #include "limn/core/output_file.h"
+#include "src/image/formats.h"
 
 namespace limn {
 namespace {
@@ -144,7 +145,8 @@ thread_local std::string ExrFile::complaint_;
 // Reads the first part of a file as an image.
 class ExrReader {
  public:
-  explicit ExrReader(const ExrFile& exr) : exr_(exr) {
+  // alpha: channel A alone; has_pixels() tells whether there is one.
+  explicit ExrReader(const ExrFile& exr, bool alpha = false) : exr_(exr), alpha_(alpha) {
     exr.check(exr_get_storage(exr.context(), 0, &storage_));
     exr.check(exr_get_compression(exr.context(), 0, &compression_));
     exr.check(exr_get_data_window(exr.context(), 0, &window_));
@@ -157,6 +159,8 @@ class ExrReader {
     height_ = int64_t{window_.max.y} - window_.min.y + 1;
     check_size();
   }
+
+  bool has_pixels() const { return !names_.empty(); }
 
   Image read() {
     image_.width = static_cast<int>(width_);
@@ -191,6 +195,7 @@ class ExrReader {
       found += (found.empty() ? "" : ", ") + name;
       has_chroma = has_chroma || name == "RY";
     }
+    if (alpha_) return full("A") ? std::vector<std::string>{"A"} : std::vector<std::string>{};
     if (full("R") && full("G") && full("B")) return {"R", "G", "B"};
     if (full("Y") && !has_chroma) return {"Y"};
     exr_.fail("needs channels R, G, B or Y in full resolution (found: " + found + ")");
@@ -335,6 +340,7 @@ class ExrReader {
   }
 
   const ExrFile& exr_;
+  bool alpha_;
   exr_storage_t storage_{};
   exr_compression_t compression_{};
   exr_attr_box2i_t window_{};
@@ -384,6 +390,12 @@ void write_exr_layers(const std::string& file, const std::vector<ImageLayer>& la
 Image read_exr(const std::string& file) {
   const ExrFile exr(file);
   return ExrReader(exr).read();
+}
+
+Image read_exr_alpha(const std::string& file) {
+  const ExrFile exr(file);
+  ExrReader reader(exr, true);
+  return reader.has_pixels() ? reader.read() : Image();
 }
 
 std::vector<ImageAttribute> read_exr_attributes(const std::string& file) {

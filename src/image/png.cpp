@@ -59,11 +59,13 @@ class PngReader {
 
   uint32_t width = 0, height = 0;
   int channels = 0;
-  bool wide = false;         // two bytes a number, else one
+  bool wide = false;  // two bytes a number, else one
+  bool has_alpha = false;
   const char* message = "";  // of an error
 
   // Sets the members above; false after an error.
-  bool read_header() {
+  // keeps_alpha: each pixel's numbers end in its opacity, of a file that says any.
+  bool read_header(bool keeps_alpha) {
     if (setjmp(png_jmpbuf(png_))) return false;  // NOLINT: libpng has no other way
     png_set_read_fn(png_, this, on_read);
     png_set_user_limits(png_, PNG_UINT_31_MAX, PNG_UINT_31_MAX);
@@ -74,6 +76,10 @@ class PngReader {
     height = png_get_image_height(png_, info_);
     channels = (png_get_color_type(png_, info_) & PNG_COLOR_MASK_COLOR) != 0 ? 3 : 1;
     wide = png_get_bit_depth(png_, info_) == 16;
+    has_alpha = (png_get_color_type(png_, info_) & PNG_COLOR_MASK_ALPHA) != 0 ||
+                png_get_valid(png_, info_, PNG_INFO_tRNS) != 0;
+    keeps_alpha_ = keeps_alpha && has_alpha;
+    if (keeps_alpha_) ++channels;
     return true;
   }
   // numbers: of all rows, after a header of this size.
@@ -81,7 +87,11 @@ class PngReader {
     if (setjmp(png_jmpbuf(png_))) return false;  // NOLINT
     png_set_palette_to_rgb(png_);
     png_set_expand_gray_1_2_4_to_8(png_);
-    png_set_strip_alpha(png_);
+    if (keeps_alpha_) {
+      png_set_tRNS_to_alpha(png_);
+    } else {
+      png_set_strip_alpha(png_);
+    }
     if (std::endian::native == std::endian::little) png_set_swap(png_);
     const int passes = png_set_interlace_handling(png_);
     png_read_update_info(png_, info_);  // takes memory for a row
@@ -109,6 +119,7 @@ class PngReader {
   static void on_warning(png_structp, png_const_charp) {}
 
   std::string_view left_;
+  bool keeps_alpha_ = false;
   png_structp png_ = nullptr;
   png_infop info_ = nullptr;
   char text_[200] = "";
@@ -116,14 +127,17 @@ class PngReader {
 
 }  // namespace
 
-StoredImage read_png(const std::string& file, std::string_view data) {
-  PngReader reader(data);
+namespace {
+
+// All numbers of the file, bytes or floats.
+StoredImage decode(const std::string& file, std::string_view data, PngReader& reader,
+                   bool keeps_alpha) {
   const auto check = [&](bool read) {
     if (read) return;
     throw InputError({file},
                      std::string("the PNG file is truncated or damaged: ") + reader.message);
   };
-  check(reader.read_header());
+  check(reader.read_header(keeps_alpha));
   // A byte inflates to at most 1032, and a pixel takes at least a bit.
   constexpr double kPixelsPerByte = 8 * 1032.0;
   const double pixel = reader.channels * (reader.wide ? 6.0 : 1.0);
@@ -145,6 +159,25 @@ StoredImage read_png(const std::string& file, std::string_view data) {
   image.floats.reserve(count);
   for (const uint16_t v : numbers) image.floats.push_back(static_cast<float>(v) / 65535.0f);
   return image;
+}
+
+}  // namespace
+
+StoredImage read_png(const std::string& file, std::string_view data) {
+  PngReader reader(data);
+  return decode(file, data, reader, false);
+}
+
+Image read_png_alpha(const std::string& file, std::string_view data) {
+  PngReader reader(data);
+  const StoredImage all = decode(file, data, reader, true);
+  if (!reader.has_alpha) return {};
+  Image alpha(all.width, all.height, 1);
+  for (size_t i = 0; i < alpha.data.size(); ++i) {
+    const size_t at = (i + 1) * static_cast<size_t>(all.channels) - 1;
+    alpha.data[i] = all.bytes.empty() ? all.floats[at] : static_cast<float>(all.bytes[at]) / 255.0f;
+  }
+  return alpha;
 }
 
 void write_png(const std::string& file, const Image& image, double exposure) {

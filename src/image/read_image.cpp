@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "limn/core/error.h"
+#include "limn/core/image_alpha.h"
 #include "limn/core/memory.h"
 #include "src/base/text.h"
 #include "src/image/formats.h"
@@ -91,6 +92,15 @@ Image read_image(const std::string& file) {
     image.data[i] = static_cast<float>(stored.srgb ? srgb_decode(v) : v);
   }
   return image;
+}
+
+Image read_alpha(const std::string& file) {
+  const std::string first = first_bytes(file);
+  if (first.starts_with(kExr)) return read_exr_alpha(file);
+  if (!first.starts_with(kFormats[0].begins)) return {};
+  const std::optional<std::string> data = read_whole_file(file);
+  if (!data) throw InputError({file}, "cannot read the file");
+  return read_png_alpha(file, *data);
 }
 
 namespace {

@@ -10,13 +10,13 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "integrators/fit/large_steps.h"
 #include "integrators/fit/optimiser.h"
-#include "integrators/fit/remesh.h"
 #include "integrators/fit/surface_tree.h"
 #include "limn/core/error.h"
 #include "limn/core/parameter.h"
+#include "limn/integrators/large_steps.h"
 #include "limn/integrators/mesh_distance.h"
+#include "limn/integrators/remesh.h"
 #include "limn/integrators/render.h"
 #include "support/meshes.h"
 #include "support/scenes.h"

@@ -65,6 +65,7 @@ void bind_check(nb::module_& m);
 void bind_compare(nb::module_& m);
 void bind_info(nb::module_& m);
 void bind_images(nb::module_& m);
+void bind_meshes(nb::module_& m);
 
 // The shape called `id`; InputError that lists the known ones.
 ShapeId find_shape(const Scene& scene, const std::string& id);

@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "limn/core/error.h"
+#include "limn/core/image_alpha.h"
 #include "tools/python/bindings.h"
 
 namespace limn::python {
@@ -64,6 +65,17 @@ void bind_images(nb::module_& m) {
       "Pixels of an EXR, PNG, JPEG, Radiance RGBE (.hdr) or BMP image, linear: float32, (H, W, 3) "
       "or (H, W, 1). "
       "Images of eight bits are decoded from sRGB; alpha is dropped.");
+  m.def(
+      "read_alpha",
+      [](nb::handle file) -> nb::object {
+        Image alpha = read_alpha(to_path("file", file));
+        if (alpha.data.empty()) return nb::none();
+        return nb::cast(to_array(std::move(alpha))).attr("squeeze")(2);
+      },
+      nb::arg("file"),
+      nb::sig("def read_alpha(file: str | os.PathLike[str]) -> numpy.ndarray | None"),
+      "The alpha channel of a PNG or EXR image: float32, (H, W), 1 where it is opaque. None where "
+      "the file has none.");
   m.def(
       "read_exr", [](nb::handle file) { return to_array(read_exr(to_path("file", file))); },
       nb::arg("file"), nb::sig("def read_exr(file: str | os.PathLike[str]) -> numpy.ndarray"),

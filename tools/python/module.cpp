@@ -40,4 +40,5 @@ NB_MODULE(_limn, m) {
   py::bind_compare(m);
   py::bind_info(m);
   py::bind_images(m);
+  py::bind_meshes(m);
 }

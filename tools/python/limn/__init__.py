@@ -36,8 +36,10 @@ from ._limn import (  # noqa: E402
     load_string,
     mesh_distance,
     methods,
+    read_alpha,
     read_exr,
     read_image,
+    remesh,
     render,
     version as __version__,
     write_exr,
@@ -50,6 +52,7 @@ from .fits import fit
 from .images import write_image
 from .meshes import write_ply
 from .parts import Part, merge, part
+from .reconstruction import Reconstruction, reconstruct
 
 __all__ = [
     "Check",
@@ -66,6 +69,7 @@ __all__ = [
     "Parameter",
     "Parameters",
     "Part",
+    "Reconstruction",
     "Scene",
     "TimeBudget",
     "Transform",
@@ -85,8 +89,11 @@ __all__ = [
     "mesh_distance",
     "methods",
     "part",
+    "read_alpha",
     "read_exr",
     "read_image",
+    "reconstruct",
+    "remesh",
     "render",
     "write_exr",
     "write_image",

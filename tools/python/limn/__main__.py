@@ -7,6 +7,10 @@ from . import _processor
 
 
 def main() -> None:
+    if sys.argv[1:2] == ["reconstruct"]:  # it is written in Python
+        from .reconstruction import main as reconstruct
+
+        sys.exit(reconstruct(sys.argv[2:]))
     program = _processor.program()
     if not os.path.exists(program):
         sys.exit("limn: this build of the module holds no program: call build/limn")

@@ -1,0 +1,308 @@
+"""From photographs to an object: see limn.reconstruct."""
+
+from __future__ import annotations
+
+import argparse
+import copy
+import json
+import os
+import sys
+import tempfile
+import time
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ._limn import LargeSteps
+from .errors import InputError
+from .photo_cameras import read_cameras
+from .photo_fit import PhotoFit, Plan, Progress
+from .photo_hull import checked, visual_hull
+from .photo_model import Model, scenes_of, vertex_normals
+from .photo_output import psnr, rendered, write_model, write_report
+from .photo_views import View, bilinear, read_views
+
+# (stage, share of the time, of the faces, what it does: see Plan); not tuned
+_STAGES: list[tuple[str, float, float, dict[str, Any]]] = [
+    ("shape from masks", 0.12, 0.4, {"step": 0.5, "smoothing": 0.05, "photographs": False}),
+    ("light", 0.16, 0.4, {"shape": False, "blur": 3.0}),
+    ("shape and light", 0.24, 0.6, {"step": 0.3, "smoothing": 0.03, "blur": 1.5}),
+    ("details", 0.32, 1.0, {"step": 0.15, "smoothing": 0.015, "blur": 0.7}),
+]
+_ERRORS = 0.06  # share of the time for each of the two fits that error bars take
+
+
+@dataclass
+class Reconstruction:
+    """What limn.reconstruct found; all of it is in the files of `folder`, too."""
+
+    model: Model
+    views: list[View]  # that the model was fitted to
+    held_out: list[View]  # that it was not
+    history: list[Progress]  # of all steps
+    figures: dict[str, Any]  # "views": PSNR [dB] by name; seconds, steps, ...
+    errors: dict[str, Any]  # per vertex, standard errors: "position" (V,), "colour" (V, 3)
+    folder: str
+
+
+def first_colours(model: Model, views: Sequence[View]) -> Any:
+    """Per vertex the mean of what the photographs show where it is in view, (V, 3)."""
+    total, weight = np.zeros_like(model.positions), np.zeros(len(model.positions))
+    with tempfile.TemporaryDirectory(prefix="limn_") as folder, warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        scene = scenes_of(model, views, folder)[0]
+    for v in views:
+        pixels, depth = v.project(model.positions)
+        origin = v.pose[:3, 3]
+        away = model.positions - origin
+        far = np.linalg.norm(away, axis=1)
+        hit = scene.intersect(np.tile(origin, (len(away), 1)), away / far[:, None])
+        seen = (hit["t"] > far - 0.01 * model.diagonal) & (depth > 0)
+        pixels = np.nan_to_num(pixels, nan=-1.0)
+        alpha = v.coverage(pixels)
+        own = seen * (alpha > 0.9) * bilinear(v.known.astype(float), pixels)
+        shown = bilinear(v.image, pixels) / np.maximum(alpha, 0.1)[:, None]
+        total += own[:, None] * shown / model.exposures.get(v.name, 1.0)
+        weight += own
+    middle = total.sum(axis=0) / max(float(weight.sum()), 1e-9)
+    return np.clip((total + 0.1 * middle) / (weight + 0.1)[:, None], 0.01, 0.95)
+
+
+def first_light(model: Model) -> None:
+    """A smooth grey sky that explains how brightness follows normals, and colours without it.
+
+    Second-order spherical harmonics of irradiance, by least squares over vertices as if all had one
+    colour, and the radiance that makes it (Ramamoorthi and Hanrahan 2001).
+    """
+    def harmonics(d: Any) -> Any:
+        x, y, z = np.moveaxis(d, -1, 0)
+        return np.stack([np.ones_like(x), x, y, z, x * y, y * z, x * z, x * x - y * y,
+                         3 * z * z - 1], -1)  # fmt: skip
+
+    normals = vertex_normals(model.positions, model.faces)
+    shown = model.colours.mean(axis=1)
+    basis = harmonics(normals)
+    damp = 0.05 * len(basis) * np.diag([0.0] + [1.0] * 8)
+    found = np.linalg.solve(basis.T @ basis + damp, basis.T @ (shown / shown.mean()))
+    irradiance = np.maximum(basis @ found, 0.2)
+    rows, columns = model.sky.shape[:2]
+    polar = ((np.arange(rows) + 0.5) / rows * np.pi)[:, None]
+    around = ((np.arange(columns) + 0.5) / columns * 2 * np.pi)[None]
+    directions = np.stack([np.sin(around) * np.sin(polar), np.cos(polar) + 0 * around,
+                           -np.cos(around) * np.sin(polar)], -1)  # fmt: skip
+    radiance = harmonics(directions) @ (found / ([1] + [2 / 3] * 3 + [1 / 4] * 5))
+    model.sky = np.repeat(np.maximum(radiance, 0.15)[..., None], 3, axis=2)
+    model.colours = np.clip(model.colours / irradiance[:, None], 0.01, 0.95)
+
+
+def _errors(model: Model, views: Sequence[View], seconds: float, steps: int | None, seed: int,
+            threads: int) -> dict[str, Any]:  # fmt: skip
+    """Standard errors by two fits of half of the views each, which start from the model.
+
+    Two estimates of half the data each differ by twice the standard error of one of all data.
+    Squares are means over neighbours: a single difference says little.
+    """
+    halves = []
+    for k in range(2):
+        fit = PhotoFit(copy.deepcopy(model), views[k::2], seed + k + 1, threads)
+        fit.run(Plan(seconds, None if steps is None else steps // 4, **_STAGES[-1][3]), "errors")
+        halves.append(fit.model)
+    one, two = halves
+    spread = LargeSteps(model.positions, model.faces, 2.0)
+    normals = vertex_normals(model.positions, model.faces)
+    along = ((one.positions - two.positions) * normals).sum(axis=1) / 2
+    colours = (one.colours - two.colours) / 2
+    position = np.sqrt(np.maximum(spread.solve(np.repeat(along[:, None] ** 2, 3, 1))[:, 0], 0))
+    return {"position": position, "colour": np.sqrt(np.maximum(spread.solve(colours**2), 0)),
+            "roughness": abs(one.roughness - two.roughness) / 2}  # fmt: skip
+
+
+def _write_errors(file: str, errors: dict[str, Any]) -> None:
+    told = {
+        "about": "standard errors per vertex of object.ply: position along the normal [scene "
+        "units], colour [linear]; from two fits of half of the views each",
+        **{k: np.round(v, 7).tolist() if isinstance(v, np.ndarray) else v
+           for k, v in errors.items()},
+    }  # fmt: skip
+    with open(file, "w", encoding="utf-8") as stream:
+        json.dump(told, stream)
+
+
+def _hold_out(views: list[View], count: int | None) -> tuple[list[View], list[View]]:
+    """(used, held out): by default the last one of eight views or more."""
+    count = int(len(views) >= 8) if count is None else count
+    if count < 0 or len(views) - count < 3:
+        raise InputError(f"hold_out: {count} of {len(views)} views: at least 3 must be left")
+    return views[: len(views) - count], views[len(views) - count :]
+
+
+def _resolution(views: Sequence[View]) -> tuple[int, int]:
+    """(cells a side of the hull's grid, faces at last): as fine as the masks.
+
+    A cell is a pixel; half of the faces face away, and two are seen in each pixel: with half as
+    many horns of a pixel's width are lost.
+    """
+    areas = [float(v.mask.sum()) for v in views]
+    sides = [max(np.ptp(np.nonzero(v.mask > 0.5), axis=1)) for v in views]
+    return int(np.clip(np.median(sides), 24, 96)), int(np.clip(4 * np.mean(areas), 800, 20000))
+
+
+def _fitted(model: Model, used: list[View], minutes: float, steps: Sequence[int | None],
+            seed: int, threads: int, history: list[Progress], tell: Any) -> tuple[Model, bool]:  # fmt: skip
+    """The model after all stages, and whether Ctrl-C ended them."""
+    most = _resolution(used)[1]
+    for (stage, share, faces, how), count in zip(_STAGES, steps):
+        model = model.remeshed(int(most * faces))
+        if stage == "light":
+            model.colours = first_colours(model, used)
+            first_light(model)
+        fit = PhotoFit(model, used, seed, threads)
+        fit.history, fit.steps = history, len(history)
+        try:
+            fit.run(Plan(60 * minutes * share, count, **how), stage, tell)
+        except KeyboardInterrupt:
+            return fit.model, True
+        model = fit.model
+    return model, False
+
+
+def reconstruct(
+    folder: str | os.PathLike[str],
+    out: str | os.PathLike[str],
+    minutes: float = 15.0,
+    *,
+    size: int = 128,
+    hold_out: int | None = None,
+    steps: Sequence[int] | None = None,
+    seed: int = 0,
+    threads: int = 0,
+    tell: Callable[[Progress], object] | None = None,
+) -> Reconstruction:
+    """Shape, colours, gloss and light of an object, from photographs with masks and cameras.
+
+    folder: holds transforms.json, or a COLMAP model (text or binary; in it, in sparse or in
+    sparse/0) and images. Masks (white: object) are alpha channels, or files masks/NAME.png. Lens
+    distortion is undone; each photograph has an exposure of its own.
+
+    out: receives object.obj (vertex colours; with xatlas also albedo.png), object.ply, sky.exr,
+    scene.xml, cameras.json, errors.json and report.html.
+
+    minutes: what the fit may take; steps: of its four stages, in its place. size: photographs are
+    made smaller, to so many pixels on the longer side. hold_out: so many of the last views are kept
+    for judging alone (default: one of eight or more). tell(progress): after each step. Ctrl-C ends
+    the fit; what it has found is written.
+
+    The sky's mean is grey, and the 98th percentile of colours is 0.8: photographs cannot tell
+    bright light from a bright object. Raises limn.InputError that names the file; warns of
+    photographs that are left out and of masks with holes.
+    """
+    folder, out = os.fspath(folder), os.fspath(out)
+    if not (minutes > 0 and size >= 8):
+        raise InputError("minutes must be above 0, and size at least 8")
+    start = time.monotonic()
+    views = checked(read_views(folder, size), read_cameras(folder)[1])
+    used, held = _hold_out(views, hold_out)
+    os.makedirs(out, exist_ok=True)
+    positions, faces = visual_hull(used, _resolution(used)[0])
+    model = Model(positions, faces, np.full((len(positions), 3), 0.5))
+    history: list[Progress] = []
+    count = [None] * len(_STAGES) if steps is None else list(steps)
+    if len(count) != len(_STAGES):
+        raise InputError(f"steps: {len(count)} numbers for {len(_STAGES)} stages")
+    model, stopped = _fitted(model, used, minutes, count, seed, threads, history, tell)
+    errors = {} if stopped else _errors(model, used, 60 * minutes * _ERRORS,
+                                        count[-1], seed, threads)  # fmt: skip
+    write_model(out, model, views)
+    if errors:
+        _write_errors(os.path.join(out, "errors.json"), errors)
+    figures = _report(out, model, used, held, history, threads, time.monotonic() - start)
+    return Reconstruction(model, used, held, history, figures, errors, out)
+
+
+def _fit_exposure(view: View, image: Any) -> float:
+    """By least squares: a held-out view's exposure is not known."""
+    inside = view.known * (view.mask > 0.5)
+    return float((inside[..., None] * view.image * image).sum()
+                 / max(1e-9, (inside[..., None] * image**2).sum()))  # fmt: skip
+
+
+def _report(out: str, model: Model, used: list[View], held: list[View], history: list[Progress],
+            threads: int, seconds: float) -> dict[str, Any]:  # fmt: skip
+    shown = [*held, *used]
+    pictures = rendered(model, shown, 64, threads)
+    for k, v in enumerate(held):
+        model.exposures[v.name] = _fit_exposure(v, pictures[k])
+        pictures[k] = pictures[k] * model.exposures[v.name]
+    views = {v.name: {"psnr": psnr(p, v.image, v.known), "held_out": v in held,
+                      "exposure": model.exposures.get(v.name, 1.0)}
+             for v, p in zip(shown, pictures)}  # fmt: skip
+    figures = {
+        "PSNR, fitted views [dB]": round(float(np.mean([views[v.name]["psnr"] for v in used])), 2),
+        "roughness": round(model.roughness, 3),
+        "specular": round(model.specular, 3),
+        "faces": len(model.faces),
+        "steps": len(history),
+        "seconds": round(seconds, 1),
+        "views": views,
+    }
+    if held:
+        mean = np.mean([views[v.name]["psnr"] for v in held])
+        figures = {"PSNR, held-out views [dB]": round(float(mean), 2), **figures}
+    write_report(os.path.join(out, "report.html"), model, used, held, history, figures, pictures)
+    return figures
+
+
+def _teller(minutes: float) -> Callable[[Progress], None]:
+    """Prints a line every ten seconds."""
+    start = last = time.monotonic()
+
+    def tell(progress: Progress) -> None:
+        nonlocal last
+        now = time.monotonic()
+        if now - last < 10:
+            return
+        last = now
+        losses = f"masks {progress.mask_loss:.4g}"
+        if progress.stage != "shape from masks":
+            losses += f", photographs {progress.loss:.4g}"
+        print(f"{now - start:5.0f} s of about {60 * minutes:.0f}: {progress.stage}, step "
+              f"{progress.step}: {losses}", flush=True)  # fmt: skip
+
+    return tell
+
+
+def main(words: Sequence[str]) -> int:
+    """limn reconstruct: an exit status."""
+    parser = argparse.ArgumentParser(
+        prog="limn reconstruct",
+        description="Shape, colours, gloss and light of an object, from photographs with masks "
+        "(alpha channels, or masks/NAME.png) and cameras (transforms.json or a COLMAP model).",
+    )
+    parser.add_argument("folder", metavar="FOLDER", help="photographs, masks and cameras")
+    parser.add_argument("-o", "--output", required=True, metavar="OUT",
+                        help="folder for the results (created if missing)")  # fmt: skip
+    parser.add_argument("--minutes", type=float, default=15.0, metavar="M",
+                        help="time for the fit (default: 15)")  # fmt: skip
+    parser.add_argument("--size", type=int, default=128, metavar="PIXELS",
+                        help="longer side to which photographs are made smaller (default: 128)")  # fmt: skip
+    parser.add_argument("--hold-out", type=int, metavar="N",
+                        help="last views kept for judging (default: one of eight or more)")  # fmt: skip
+    parser.add_argument("--seed", type=int, default=0, help="of the random numbers (default: 0)")
+    parser.add_argument("--threads", type=int, default=0, help="default: all cores")
+    given = parser.parse_args(words)
+    warnings.showwarning = lambda message, *_: print(f"warning: {message}", file=sys.stderr)
+    try:
+        found = reconstruct(given.folder, given.output, given.minutes, size=given.size,
+                            hold_out=given.hold_out, seed=given.seed, threads=given.threads,
+                            tell=_teller(given.minutes))  # fmt: skip
+    except (InputError, OSError) as error:
+        print(error, file=sys.stderr)
+        return 2
+    for name, value in found.figures.items():
+        if name != "views":
+            print(f"{name:28} {value}")
+    print(f"{'report':28} {os.path.join(found.folder, 'report.html')}")
+    return 0
