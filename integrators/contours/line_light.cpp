@@ -199,6 +199,7 @@ LineLight::LineLight(const Scene& scene, const RayTracer& tracer, int threads,
   if (has_emitters()) find_overlaps(threads);
   if (!sky_ || !sky_->grid()) return;
   columns_ = std::make_unique<RadianceColumns>(*sky_, threads);
+  if (options_.uniform) return;
   std::vector<double> brightness = columns_->brightness();
   for (int k = 0; k < 2; ++k) {
     warps_.emplace_back(brightness);
@@ -348,21 +349,31 @@ Rgb<double> LineLight::sky_light(const Receiver& receiver, double offset) const 
   return receiver.scattering.eval(receiver.n) * radiance * sum;
 }
 
+// A map's own, from its pole above the face.
+Pencil LineLight::meridians(const Vec3d& up, const Environment::Grid& grid) const {
+  const Vec3d pole = grid.pole * (dot(up, grid.pole) >= 0 ? 1 : -1);
+  const Vec3d quarter = cross(pole, grid.zero);
+  // Around one pole azimuths run as columns do, around the other they run back.
+  const AzimuthWarp* warp = warps_.empty() ? nullptr : &warps_[dot(quarter, grid.quarter) < 0];
+  return {pole, grid.zero, quarter, 1, 1, warp};
+}
+
 // Of a map, along its own meridians.
 Rgb<double> LineLight::map_light(const Receiver& receiver, double offset) const {
   const ContourPoint& at = receiver.at;
   const Environment::Grid& grid = columns_->grid();
-  const double turned = dot(at.up, grid.pole) >= 0 ? 1 : -1;
-  // Around one pole azimuths run as columns do, around the other they run back.
-  const Vec3d pole = grid.pole * turned, quarter = cross(pole, grid.zero);
-  const Pencil pencil{pole, grid.zero, quarter, 1, 1, &warps_[dot(quarter, grid.quarter) < 0]};
+  const Pencil pencil = meridians(at.up, grid);
+  const double turned = dot(pencil.pole, grid.pole);
   const int w = contours_.count(at, pencil.pole, nullptr);
   const auto cosine = [&](const RadianceColumns::Meridian& meridian, const Vec3d& r,
                           const Azimuth& from, const Azimuth& to) {
-    const auto a = columns_->sum(meridian, from.c * turned, from.s);
-    const auto b = columns_->sum(meridian, to.c * turned, to.s);
     const double along = dot(receiver.n, grid.pole), across = dot(receiver.n, r);
-    return ((b.pole - a.pole) * along + (b.across - a.across) * across) * turned;
+    const auto up_to = [&](const Azimuth& end) {
+      const double c = end.c * turned;
+      return columns_->sum(meridian,
+                           columns_->weights(std::atan2(end.s, c), c, end.s, along, across));
+    };
+    return (up_to(to) - up_to(from)) * turned;
   };
   const Rgb<double> scale = receiver.scattering.eval(receiver.n);
   const Vec3d planes[] = {at.up};
@@ -372,6 +383,27 @@ Rgb<double> LineLight::map_light(const Receiver& receiver, double offset) const 
         return cosine(columns_->meridian(line.r), line.r, a, b);
       });
   return scale * sum;
+}
+
+void LineLight::record(const SurfacePoint<double>& surface, const Scattering<double>& scattering,
+                       double offset, double weight, SkyRecord& record) const {
+  const Receiver receiver = receiver_at(surface, scattering);
+  const ContourPoint& at = receiver.at;
+  list(at, {}, nullptr);
+  const Environment::Grid& grid = record.grid();
+  const Pencil pencil = meridians(at.up, grid);
+  const int w = contours_.count(at, pencil.pole, nullptr);
+  const bool turned = dot(pencil.pole, grid.pole) < 0;
+  record.begin(scattering.eval(receiver.n) * weight, receiver.n, offset,
+               dot(pencil.v, grid.quarter) < 0);
+  sum_over_lines<double>(at, pencil, {&at.up, 1}, w, nullptr, {options_.lines, offset},
+                         [&](const Isolines::Line& line, const Azimuth& from, const Azimuth& to) {
+                           const size_t j = &line - &scratch().isolines.line(0);
+                           const double a = from.theta(), b = to.theta();
+                           record.add_range(j, turned ? kPi - b : a, turned ? kPi - a : b);
+                           return 0.0;
+                         });
+  record.end();
 }
 
 Rgb<double> LineLight::emitter_light(const Emitter& emitter, const Receiver& receiver,

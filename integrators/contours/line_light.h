@@ -14,6 +14,7 @@
 #include "integrators/contours/contours.h"
 #include "integrators/contours/isolines.h"
 #include "integrators/contours/radiance_columns.h"
+#include "integrators/contours/sky_record.h"
 #include "integrators/lights/light_regions.h"
 #include "limn/core/face_overlaps.h"
 #include "limn/core/shading.h"
@@ -25,6 +26,7 @@ struct LineOptions {
   // Above 0: lines, 8 at least, are doubled until the results of two halves differ by at most twice
   // this part of the result, or until there are kMostLines. That is no more unbiased.
   double tolerance = 0;
+  bool uniform = false;  // lines through a map at equal azimuths, else dense where it is bright
   std::string method = "lines";  // that errors name
 };
 inline constexpr int kMostLines = 1 << 14;
@@ -61,6 +63,10 @@ class LineLight {
                        double offset) const;
   Rgb<double> environment(const SurfacePoint<double>& surface, const Scattering<double>& scattering,
                           double offset) const;
+  // What `environment` integrates of a map, without its radiance, times `weight`, where lines are
+  // uniform: along meridians of the record's grid.
+  void record(const SurfacePoint<double>& surface, const Scattering<double>& scattering,
+              double offset, double weight, SkyRecord& record) const;
   bool has_emitters() const { return !emitters_.empty(); }
   // How many sums ended at kMostLines above the tolerance, so far.
   int64_t missed() const { return missed_; }
@@ -93,6 +99,7 @@ class LineLight {
   Rgb<double> emitter_light(const Emitter& emitter, const Receiver& receiver, double offset) const;
   Rgb<double> sky_light(const Receiver& receiver, double offset) const;
   Rgb<double> map_light(const Receiver& receiver, double offset) const;
+  Pencil meridians(const Vec3d& up, const Environment::Grid& grid) const;
   struct LineChoice {
     int count;
     double offset;  // of the first line, in [0, 1) of their distance

@@ -17,46 +17,59 @@ RadianceColumns::Moments RadianceColumns::moments(double theta, double c, double
 }
 
 RadianceColumns::RadianceColumns(const Environment& environment, int threads)
-    : grid_(environment.grid().value()), step_(kPi / (grid_.rows - 1)) {
+    : grid_(environment.grid().value()),
+      step_(kPi / (grid_.rows - 1)),
+      per_step_(1 / step_),
+      stride_(static_cast<size_t>(grid_.rows) + 1) {
   const int rows = grid_.rows;
-  require_memory({},
-                 static_cast<double>(grid_.columns) * rows * (sizeof(Rgb<double>) + sizeof(Sum)),
+  require_memory({}, static_cast<double>(grid_.columns) * stride_ * sizeof(Cell),
                  "the sums over the environment's map", "use a smaller map, or another method");
-  texels_.resize(static_cast<size_t>(grid_.columns) * rows);
-  sums_.resize(texels_.size());
+  cells_.resize(grid_.columns * stride_);
   for (int j = 0; j < rows; ++j) {
     const double theta = step_ * j;
     at_rows_.push_back(moments(theta, std::cos(theta), std::sin(theta)));
   }
   parallel_for(grid_.columns, threads, [&](size_t i) {
-    const double phi = 2 * kPi * (static_cast<double>(i) + 0.5) / grid_.columns;
-    const Vec3d r = grid_.zero * std::cos(phi) + grid_.quarter * std::sin(phi);
-    const size_t column = i * rows;
+    Cell* column = &cells_[i * stride_];
     for (int j = 0; j < rows; ++j) {
-      // At the poles radiance depends on the azimuth of approach: a direction next to it tells.
-      const double theta = std::clamp(step_ * j, 1e-7, kPi - 1e-7);
-      texels_[column + j] =
-          environment.radiance(grid_.pole * std::cos(theta) + r * std::sin(theta));
+      const Rgb<double> radiance = environment.radiance(direction(static_cast<int>(i), j));
+      column[j].texel = Colour{radiance.r, radiance.g, radiance.b, 0};
     }
     for (int j = 0; j + 1 < rows; ++j) {
-      const Moments &m = at_rows_[j], &n = at_rows_[j + 1];
-      const Rgb<double> slope = (texel(column, j + 1) - texel(column, j)) * (1 / step_);
-      const Rgb<double> level = texel(column, j) - slope * (step_ * j);
-      const Sum& before = sums_[column + j];
-      sums_[column + j + 1] = {
-          before.pole + level * (n.pole - m.pole) + slope * (n.pole_linear - m.pole_linear),
-          before.across + level * (n.across - m.across) +
-              slope * (n.across_linear - m.across_linear)};
+      const InRow w = in_row(j, at_rows_[j + 1]);
+      const Cell &here = column[j], &below = column[j + 1];
+      column[j + 1].pole = here.pole + here.texel * w.pole_here + below.texel * w.pole_below;
+      column[j + 1].across =
+          here.across + here.texel * w.across_here + below.texel * w.across_below;
     }
   });
+}
+
+// At the poles radiance depends on the azimuth of approach: a direction next to it tells.
+Vec3d RadianceColumns::direction(int column, int row) const {
+  const double phi = 2 * kPi * (column + 0.5) / grid_.columns;
+  const double theta = std::clamp(step_ * row, 1e-7, kPi - 1e-7);
+  const Vec3d r = grid_.zero * std::cos(phi) + grid_.quarter * std::sin(phi);
+  return grid_.pole * std::cos(theta) + r * std::sin(theta);
+}
+
+// Between two rows radiance is here + (below - here) (theta - step row) / step.
+RadianceColumns::InRow RadianceColumns::in_row(int row, const Moments& end) const {
+  const Moments& start = at_rows_[row];
+  const double theta = step_ * row;
+  const double pole = end.pole - start.pole, across = end.across - start.across;
+  const double pole_below = (end.pole_linear - start.pole_linear - theta * pole) * per_step_;
+  const double across_below =
+      (end.across_linear - start.across_linear - theta * across) * per_step_;
+  return {pole - pole_below, pole_below, across - across_below, across_below};
 }
 
 std::vector<double> RadianceColumns::brightness() const {
   const int columns = grid_.columns;
   std::vector<double> own(columns), spread(columns);
   for (int i = 0; i < columns; ++i) {
-    const Rgb<double>& sum = sums_[static_cast<size_t>(i + 1) * grid_.rows - 1].across;
-    own[i] = std::fmax(luminance(sum), 0.0);
+    const Colour& sum = cells_[i * stride_ + grid_.rows - 1].across;
+    own[i] = std::fmax(luminance(Rgb<double>{sum[0], sum[1], sum[2]}), 0.0);
   }
   // Radiance of a column reaches to the next on both sides.
   for (int i = 0; i < columns; ++i) {
@@ -67,32 +80,67 @@ std::vector<double> RadianceColumns::brightness() const {
 }
 
 RadianceColumns::Meridian RadianceColumns::meridian(const Vec3d& r) const {
-  const double phi = std::atan2(dot(r, grid_.quarter), dot(r, grid_.zero));
-  double x = phi * (grid_.columns / (2 * kPi)) - 0.5;
+  const double turn = std::atan2(dot(r, grid_.quarter), dot(r, grid_.zero)) / (2 * kPi);
+  return meridian(turn < 0 ? turn + 1 : turn);
+}
+
+RadianceColumns::Meridian RadianceColumns::meridian(double turn) const {
+  double x = turn * grid_.columns - 0.5;
   if (x < 0) x += grid_.columns;
   const int column = std::clamp(static_cast<int>(x), 0, grid_.columns - 1);
   const int next = column + 1 == grid_.columns ? 0 : column + 1;
-  return {static_cast<size_t>(column) * grid_.rows, static_cast<size_t>(next) * grid_.rows,
-          x - column};
+  return {column * stride_, next * stride_, x - column};
 }
 
-RadianceColumns::Sum RadianceColumns::sum(const Meridian& at, double cos_theta,
-                                          double sin_theta) const {
-  const double theta = std::atan2(sin_theta, cos_theta);
-  const int row = std::clamp(static_cast<int>(theta / step_), 0, grid_.rows - 2);
-  const Moments &m = at_rows_[row], n = moments(theta, cos_theta, sin_theta);
-  // Along the meridian between two columns the map is linear, too.
-  const auto mix = [&](const Rgb<double>& a, const Rgb<double>& b) {
-    return a + (b - a) * at.share;
+RadianceColumns::Weights RadianceColumns::weights(double theta, double cos_theta, double sin_theta,
+                                                  double along, double across) const {
+  const int row = std::clamp(static_cast<int>(theta * per_step_), 0, grid_.rows - 2);
+  const InRow w = in_row(row, moments(theta, cos_theta, sin_theta));
+  return {row, along, across, along * w.pole_here + across * w.across_here,
+          along * w.pole_below + across * w.across_below};
+}
+
+// Along the meridian between two columns the map is linear, too.
+Rgb<double> RadianceColumns::sum(const Meridian& at, const Weights& weights) const {
+  const auto of = [&](size_t column) {
+    const Cell* cell = &cells_[column + weights.row];
+    return cell->pole * weights.along + cell->across * weights.across + cell->texel * weights.here +
+           cell[1].texel * weights.below;
   };
-  const Rgb<double> here = mix(texel(at.first, row), texel(at.second, row));
-  const Rgb<double> below = mix(texel(at.first, row + 1), texel(at.second, row + 1));
-  const Rgb<double> slope = (below - here) * (1 / step_);
-  const Rgb<double> level = here - slope * (step_ * row);
-  const Sum &a = sums_[at.first + row], &b = sums_[at.second + row];
-  return {mix(a.pole, b.pole) + level * (n.pole - m.pole) + slope * (n.pole_linear - m.pole_linear),
-          mix(a.across, b.across) + level * (n.across - m.across) +
-              slope * (n.across_linear - m.across_linear)};
+  const Colour sum = of(at.first) * (1 - at.share) + of(at.second) * at.share;
+  return {sum[0], sum[1], sum[2]};
+}
+
+void RadianceColumns::add(const Meridian& at, const Weights& weights, const Rgb<double>& d_sum,
+                          Adjoint& adjoint) {
+  const Colour all{d_sum.r, d_sum.g, d_sum.b, 0};
+  for (const bool second : {false, true}) {
+    Cell* cell = &adjoint[(second ? at.second : at.first) + weights.row];
+    const Colour d = all * (second ? at.share : 1 - at.share);
+    cell->pole += d * weights.along;
+    cell->across += d * weights.across;
+    cell->texel += d * weights.here;
+    cell[1].texel += d * weights.below;
+  }
+}
+
+void RadianceColumns::finish(
+    Adjoint adjoint, const std::function<void(const Vec3d&, const Rgb<double>&)>& add) const {
+  for (int i = 0; i < grid_.columns; ++i) {
+    Cell* column = &adjoint[i * stride_];
+    for (int j = grid_.rows - 2; j >= 0; --j) {
+      const InRow w = in_row(j, at_rows_[j + 1]);
+      const Cell below = column[j + 1];
+      column[j].pole += below.pole;
+      column[j].across += below.across;
+      column[j].texel += below.pole * w.pole_here + below.across * w.across_here;
+      column[j + 1].texel += below.pole * w.pole_below + below.across * w.across_below;
+    }
+    for (int j = 0; j < grid_.rows; ++j) {
+      const Colour& d = column[j].texel;
+      add(direction(i, j), {d[0], d[1], d[2]});
+    }
+  }
 }
 
 }  // namespace limn

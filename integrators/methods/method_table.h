@@ -21,7 +21,14 @@ inline std::vector<MethodType> other_methods() {
           {.name = "lines",
            .description = "direct light, ambient occlusion and open sky, integrated along lines "
                           "between silhouettes",
-           .image = ImageMethod{.looks_around = true, .by_lines = true}},
+           .settings = {{"azimuths",
+                         "of lines through a map: dense where it is bright (map), or uniform",
+                         {"map", "uniform"}}},
+           .set_up =
+               [](MethodType& row) {
+                 row.image = ImageMethod{.looks_around = true, .by_lines = true};
+                 row.image->uniform_lines = row.settings["azimuths"] == "uniform";
+               }},
           {.name = "rays",
            .description = "direct light, ambient occlusion and open sky, by quasi-random rays",
            .image = ImageMethod{.looks_around = true}}};

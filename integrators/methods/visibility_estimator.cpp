@@ -52,7 +52,8 @@ VisibilityEstimator::VisibilityEstimator(const Scene& scene, const RunSettings& 
   if (chooses && direct && sky) split_ = split_environment(*sky, settings.threads);
   if (split_) sky = split_->rest;
   if (method.by_lines) {
-    const LineOptions lines{options.lines, options.tolerance, options.method.name()};
+    const LineOptions lines{options.lines, options.tolerance, method.uniform_lines,
+                            options.method.name()};
     lines_ = std::make_unique<LineLight>(scene, *tracer_, settings.threads, lines, direct, sky);
   } else if (direct) {
     check_direct_light(scene, options.method.name());
@@ -176,6 +177,23 @@ Rgb<double> VisibilityEstimator::sample(const PixelSample& at, SampleLog* log,
   return all;
 }
 
+Rgb<double> VisibilityEstimator::record(const PixelSample& at, double weight,
+                                        SkyRecord& record) const {
+  RayCount rays;
+  Rgb<double> all;
+  for (size_t i = 0; i < plan_.parts.size(); ++i) {
+    const double share = 1.0 / plan_.looks[i].points;
+    for (int k = 0; k < plan_.looks[i].points; ++k) {
+      const uint64_t number = at.s * plan_.looks[i].points + k;
+      all += film_point(
+                 {at, plan_.parts[i], number, 0, i == 0, seed_, seed_, 1, &record, weight * share},
+                 nullptr, rays) *
+             share;
+    }
+  }
+  return all;
+}
+
 Rng VisibilityEstimator::even(const Point& point, uint64_t seed, uint64_t number) {
   const PixelSample& at = point.at;
   const uint64_t pixel = static_cast<uint64_t>(at.y) << 32 | static_cast<uint32_t>(at.x);
@@ -203,7 +221,8 @@ Rgb<double> VisibilityEstimator::film_point(const Point& point, SampleLog* log,
   if (!tracer_->closest(camera_ray(scene_, start), hit)) {
     if (!image) return grey(1.0);
     const bool sky = scene_.environment && !scene_.hide_emitters && point.shows;
-    return sky ? scene_.environment->radiance(direction) : Rgb<double>{};
+    if (sky && point.record) point.record->add_view(direction, point.weight);
+    return sky && !point.record ? scene_.environment->radiance(direction) : Rgb<double>{};
   }
   const auto surface = surface_on_ray<double>(scene_, hit.face, origin, direction);
   const Scattering<double> scattering(surface, -direction, scene_.shading);
@@ -234,7 +253,11 @@ Rgb<double> VisibilityEstimator::by_lines(const Seen& seen) const {
       sum = lines_->emitters(seen.surface, seen.scattering, offset);
     }
     if (point.has(VisibilityPart::kSky)) {
-      sum += lines_->environment(seen.surface, seen.scattering, offset);
+      if (point.record) {
+        lines_->record(seen.surface, seen.scattering, offset, point.weight, *point.record);
+      } else {
+        sum += lines_->environment(seen.surface, seen.scattering, offset);
+      }
     }
     return sum;
   }

@@ -27,6 +27,10 @@ class VisibilityEstimator final : public SampleEstimator {
   const char* slot_name(size_t) const override { return "radiance"; }
   void add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const override;
 
+  // By lines alone: what does not come from the environment, while what does goes to the record,
+  // `weight` times.
+  Rgb<double> record(const PixelSample& at, double weight, SkyRecord& record) const;
+
   // Rays and points, by cell of the film and by part.
   std::vector<double> choice() const;
   // Sums over lines that ended above the tolerance, so far.
@@ -41,7 +45,9 @@ class VisibilityEstimator final : public SampleEstimator {
     int rays;         // 0: by lines
     bool shows;       // what shines at the camera belongs to it
     uint64_t seed, seed_of_look;
-    double reach = 1;  // from the pixel's center, of the way to where it would be
+    double reach = 1;             // from the pixel's center, of the way to where it would be
+    SkyRecord* record = nullptr;  // that takes what comes from the environment
+    double weight = 1;            // there
     bool has(VisibilityPart p) const { return part == p || part == VisibilityPart::kAll; }
   };
   // What it sees.

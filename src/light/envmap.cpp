@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "limn/core/check.h"
+#include "limn/core/environment_map.h"
 #include "src/light/environment_map.h"
 #include "src/light/types.h"
 
@@ -162,6 +163,14 @@ void MapEnvironment::find_each(std::span<const Found> found) const {
 }
 
 }  // namespace
+
+std::shared_ptr<Environment> make_map_environment(const Image& image, double scale, double turn,
+                                                  const std::string& file) {
+  const double angle = turn * (kPi / 180), c = std::cos(angle), s = std::sin(angle);
+  const Vec3d axes[3] = {{c, 0, -s}, {0, 1, 0}, {s, 0, c}};
+  return std::make_shared<MapEnvironment>(std::make_shared<EnvironmentMap>(image), axes, scale,
+                                          file);
+}
 
 void read_envmap(Properties& properties, Scene& scene, Shape*) {
   const std::string file = properties.file("filename");

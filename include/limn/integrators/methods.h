@@ -19,8 +19,9 @@ struct ImageMethod {
   bool closed_light = false;  // light that is scattered once, in closed form
   // One vertex that looks around: direct light, and how open its sky is.
   bool looks_around = false;
-  bool by_lines = false;  // between silhouettes
-  bool chooses = false;   // between these and rays
+  bool by_lines = false;       // between silhouettes
+  bool chooses = false;        // between these and rays
+  bool uniform_lines = false;  // through a map at equal azimuths
 };
 
 // How a method computes in reverse mode.
