@@ -11,6 +11,7 @@
 namespace limn {
 
 bool EdgeMotion::moves(EdgeRef id) const {
+  if (const FramedLight* const light = frame(id)) return slots_.of(*light) != nullptr;
   if (!is_crossing(id)) return moves(shape_of(id));
   for (const FaceRef face : input_->object(id.object).faces_around(id.edge))
     if (moves(face.shape)) return true;
@@ -40,6 +41,10 @@ void EdgeMotion::contribute(Tape& tape, Seeds& seeds, const BoundaryForm& form,
     const Vec3d g = point.g * weight;
     switch (point.of) {
       case MovingPoint::Of::kEdge:
+        if (frame(point.edge)) {
+          contribute_frame(seeds, point, g);
+          break;
+        }
         contribute_end(tape, point.edge, 0, g * (1 - point.t));
         contribute_end(tape, point.edge, 1, g * point.t);
         break;
@@ -98,6 +103,20 @@ void EdgeMotion::contribute_end(Tape& tape, EdgeRef id, int end, const Vec3d& g)
   const CutVertex& cut = mesh.cuts[vertex.index() - own];
   contribute_vertex(tape, id.object, cut.ends[0].index(), g * (1 - cut.t));
   contribute_vertex(tape, id.object, cut.ends[1].index(), g * cut.t);
+}
+
+void EdgeMotion::contribute_frame(Seeds& seeds, const MovingPoint& point, const Vec3d& g) const {
+  const FramedLight& light = *frame(point.edge);
+  const auto corners = light.corners();
+  const auto& ends = point.mesh->edge(point.edge.edge).vertices;
+  for (int end = 0; end < 2; ++end) {
+    const Vec3d weight = g * (end == 0 ? 1 - point.t : point.t);
+    const size_t k = ends[end].index();
+    const double distance = length(point.mesh->position(ends[end]) - value(light.origin().v)) /
+                            length(value(corners[k]));
+    seeds.add(light_origin(light), weight);
+    seeds.add(corner_of_frame(light, k), weight * distance);
+  }
 }
 
 // See intersection_velocity(): a point x of the line moves with v = (s m x l + t l x n) / |l|^2, l

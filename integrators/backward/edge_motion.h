@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "integrators/terms/boundary_sample.h"
+#include "integrators/terms/light_frames.h"
 #include "limn/core/slots.h"
 
 namespace limn {
@@ -47,11 +48,14 @@ class EdgeMotion {
  private:
   bool is_crossing(EdgeRef id) const { return !input_->object(id.object).shape.valid(); }
   ShapeId shape_of(EdgeRef id) const { return input_->object(id.object).shape; }
+  const FramedLight* frame(EdgeRef id) const { return light_of_frame(scene(), *input_, id.object); }
   bool moves(ShapeId shape) const { return slots_.mesh(shape).positions != 0; }
   bool moves(EdgeRef id) const;
   bool moves(const MovingPoint& point) const;
   // g: the derivative with respect to the position of an end of the edge.
   void contribute_end(Tape& tape, EdgeRef id, int end, const Vec3d& g) const;
+  // The same of both ends of a side of a light's frame.
+  void contribute_frame(Seeds& seeds, const MovingPoint& point, const Vec3d& g) const;
   void contribute_crossing(Tape& tape, EdgeRef id, const Vec3d& x, const Vec3d& g) const;
   void contribute_face(Tape& tape, FaceRef face, const Vec3d& x, const Vec3d& g) const;
   void contribute_lift(Tape& tape, const MovingLift& lift, double weight) const;

@@ -11,6 +11,7 @@
 #include "integrators/estimates/equal_batches.h"
 #include "integrators/estimates/film_batch.h"
 #include "integrators/estimates/gradient_estimator.h"
+#include "integrators/estimates/shared_place.h"
 #include "integrators/estimates/splat.h"
 #include "limn/core/error.h"
 #include "limn/core/memory.h"
@@ -26,17 +27,39 @@ const GradientEstimator* gradient_of(const SampleEstimator& estimator) {
   return dynamic_cast<const GradientEstimator*>(&estimator);
 }
 
-Rng pixel_key(const SampleEstimator& estimator, const Batch& batch, const PixelSample& at) {
-  const uint64_t pixel = static_cast<uint64_t>(at.y) * estimator.scene().camera.width + at.x;
+Rng key_of(const SampleEstimator& estimator, const Batch& batch, uint64_t pixel, int64_t s) {
   switch (estimator.numbers()) {
     case Numbers::kEvenInBatches:
-      return even_in_batch(batch, pixel, at.s - batch.first);
+      return even_in_batch(batch, pixel, s - batch.first);
     case Numbers::kEvenInRun:
-      return Rng::even(batch.seed, pixel, static_cast<uint32_t>(at.s));
+      return Rng::even(batch.seed, pixel, static_cast<uint32_t>(s));
     case Numbers::kIndependent:
       break;
   }
-  return {batch.seed, pixel, static_cast<uint64_t>(at.s)};
+  return {batch.seed, pixel, static_cast<uint64_t>(s)};
+}
+Rng pixel_key(const SampleEstimator& estimator, const Batch& batch, const PixelSample& at) {
+  const uint64_t pixel = static_cast<uint64_t>(at.y) * estimator.scene().camera.width + at.x;
+  return key_of(estimator, batch, pixel, at.s);
+}
+// Null where samples serve their own pixels alone.
+const SharingEstimator* sharing_of(const SampleEstimator& estimator) {
+  const auto* sharing = dynamic_cast<const SharingEstimator*>(&estimator);
+  return sharing && sharing->reach() > 0 ? sharing : nullptr;
+}
+SharedPlace shared_place(const SharingEstimator& estimator, const Batch& batch, int64_t s) {
+  return {estimator.scene().film.filter, estimator.reach(),
+          key_of(estimator, batch, UINT64_MAX, s)};
+}
+
+// The part of the film that samples of a tile add to.
+Film reach_of(const Film& film, const Tile& tile, int reach) {
+  Film part = film;
+  part.crop_x = std::max(film.crop_x, tile.x0 - reach);
+  part.crop_y = std::max(film.crop_y, tile.y0 - reach);
+  part.crop_width = std::min(film.crop_x + film.crop_width, tile.x1 + reach) - part.crop_x;
+  part.crop_height = std::min(film.crop_y + film.crop_height, tile.y1 + reach) - part.crop_y;
+  return part;
 }
 
 // One estimator over one batch.
@@ -45,6 +68,7 @@ class BatchRunner {
   BatchRunner(const SampleEstimator& estimator, const Batch& batch, int threads,
               ProgressCounter& progress)
       : estimator_(estimator),
+        sharing_(sharing_of(estimator)),
         film_(estimator.scene().film),
         batch_(batch),
         threads_(threads),
@@ -54,6 +78,9 @@ class BatchRunner {
     sums_.images.resize(estimator.slots() * estimator.lanes());
     for (auto& image : sums_.images) image.assign(film_size(film_), 0.0);
     sums_.costs.resize(estimator.slots());
+    for (int s = batch.first; sharing_ && s < batch.last; ++s) {
+      places_.push_back(shared_place(*sharing_, batch, s));
+    }
   }
 
   BatchSums run() {
@@ -70,33 +97,57 @@ class BatchRunner {
     const std::vector<Tile> tiles = make_tiles(film_);
     std::vector<std::vector<TermCost>> costs(tiles.size());
     std::vector<NonFinite> bad(tiles.size());
+    std::vector<BatchSums> parts(sharing_ ? tiles.size() : 0);  // they overlap
     parallel_for(tiles.size(), threads_, [&](size_t i) {
       if (progress_.stopped()) return;
       costs[i].resize(estimator_.slots());
-      run_tile(tiles[i], costs[i], bad[i]);
+      if (parts.empty()) {
+        SampleSink sink(film_, estimator_.lanes(), lane_scale_, sums_, costs[i], bad[i], nullptr);
+        run_tile(tiles[i], costs[i], sink);
+      } else {
+        const Film part = reach_of(film_, tiles[i], sharing_->reach());
+        parts[i].radiance.assign(film_size(part), 0.0);
+        SampleSink sink(part, estimator_.lanes(), lane_scale_, parts[i], costs[i], bad[i], nullptr);
+        run_tile(tiles[i], costs[i], sink);
+      }
       progress_.step(batch_.count());
     });
     if (progress_.stopped()) return;
+    for (size_t i = 0; i < parts.size(); ++i) {
+      add_part(reach_of(film_, tiles[i], sharing_->reach()), parts[i].radiance);
+    }
     for (size_t i = 0; i < tiles.size(); ++i) {
       for (size_t slot = 0; slot < costs[i].size(); ++slot) sums_.costs[slot].merge(costs[i][slot]);
       sums_.non_finite.merge(bad[i]);
     }
   }
 
-  void run_tile(const Tile& tile, std::vector<TermCost>& costs, NonFinite& bad) {
+  void add_part(const Film& part, const std::vector<double>& radiance) {
+    const size_t row = size_t{3} * part.crop_width;
+    for (int y = 0; y < part.crop_height; ++y) {
+      const double* from = &radiance[y * row];
+      double* to = &sums_.radiance[pixel_index(film_, part.crop_x, part.crop_y + y)];
+      for (size_t i = 0; i < row; ++i) to[i] += from[i];
+    }
+  }
+
+  void run_tile(const Tile& tile, std::vector<TermCost>& costs, SampleSink& sink) {
     const Stopwatch watch;
-    SampleSink sink(film_, estimator_.lanes(), lane_scale_, sums_, costs, bad, nullptr);
     std::vector<KeyedSample> together;
+    std::vector<const SharedPlace*> places;  // of these
     const size_t most = estimator_.together();
     const auto add = [&] {
-      estimator_.add_pixels(together, sink);
+      sharing_ ? sharing_->add_shared(together, places, sink)
+               : estimator_.add_pixels(together, sink);
       together.clear();
+      places.clear();
     };
     for (int y = tile.y0; y < tile.y1; ++y) {
       for (int x = tile.x0; x < tile.x1; ++x) {
         for (int s = batch_.first; s < batch_.last; ++s) {
           const PixelSample at{x, y, s};
           together.push_back({at, pixel_key(estimator_, batch_, at)});
+          if (sharing_) places.push_back(&places_[s - batch_.first]);
           if (together.size() == most) add();
         }
       }
@@ -198,12 +249,14 @@ class BatchRunner {
   }
 
   const SampleEstimator& estimator_;
+  const SharingEstimator* sharing_;
   const Film& film_;
   const Batch& batch_;
   int threads_;
   ProgressCounter& progress_;
   Lanes lane_scale_;
   BatchSums sums_;
+  std::vector<SharedPlace> places_;  // of every sample, if they are shared
 };
 
 BatchStore::Task task_of(const RunSettings& settings, int64_t first) {
@@ -388,7 +441,13 @@ void run_pixel_sample(const SampleEstimator& estimator, uint64_t seed, const Pix
   SampleSink sink(film, estimator.lanes(), lane_scale, sums, costs, bad, &log);
   const Batch batch = batch_of(estimator, seed, INT_MAX, static_cast<int>(at.s));
   const KeyedSample one{at, pixel_key(estimator, batch, at)};
-  estimator.add_pixels({&one, 1}, sink);
+  if (const SharingEstimator* sharing = sharing_of(estimator)) {
+    const SharedPlace place = shared_place(*sharing, batch, at.s);
+    const SharedPlace* const places[] = {&place};
+    sharing->add_shared({&one, 1}, places, sink);
+  } else {
+    estimator.add_pixels({&one, 1}, sink);
+  }
   const size_t index = pixel_index(film, at.x, at.y);
   const auto rgb = [&](const std::vector<double>& image) {
     return fmt::format("({:.6g}, {:.6g}, {:.6g})", image[index], image[index + 1],

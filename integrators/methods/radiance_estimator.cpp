@@ -2,10 +2,10 @@
 #include "integrators/methods/radiance_estimator.h"
 
 #include <algorithm>
+#include <array>
 #include <utility>
 #include <vector>
 
-#include "integrators/paths/film_rays.h"
 #include "integrators/paths/path_follow.h"
 #include "integrators/paths/path_log.h"
 
@@ -20,7 +20,10 @@ RadianceEstimator::RadianceEstimator(const Scene& scene, int threads,
       filter_(scene_.film.filter),
       visible_(std::move(visible)),
       numbers_(numbers),
-      glossy_(is_glossy(scene_)) {}
+      glossy_(is_glossy(scene_)),
+      reach_(numbers == Numbers::kEvenInRun && !closed && !visible_
+                 ? SharedPlace::reach_of(scene_.film)
+                 : 0) {}
 
 RadianceEstimator::RadianceEstimator(const Scene& moved, const PathChoices& choices, int threads,
                                      Numbers numbers)
@@ -40,23 +43,26 @@ void RadianceEstimator::add_pixels(std::span<const KeyedSample> samples, SampleS
     if (sink.log()) {
       PathLog visitor(*sink.log());
       for (const KeyedSample& sample : samples) {
-        trace({&sample, 1}, mirrored, weight, &visitor, sink);
+        const std::span<const KeyedSample> one(&sample, 1);
+        trace(one, {scene_, camera_, filter_, one, mirrored}, &visitor, sink,
+              [&](const auto& walks) { add(walks, one, weight, sink); });
       }
     } else {
-      trace(samples, mirrored, weight, static_cast<NoVisitor*>(nullptr), sink);
+      trace(samples, {scene_, camera_, filter_, samples, mirrored},
+            static_cast<NoVisitor*>(nullptr), sink,
+            [&](const auto& walks) { add(walks, samples, weight, sink); });
     }
   }
 }
 
-template <class Visitor>
-void RadianceEstimator::trace(std::span<const KeyedSample> samples, bool mirrored, double weight,
-                              Visitor* visitor, SampleSink& sink) const {
+template <class Visitor, class Add>
+void RadianceEstimator::trace(std::span<const KeyedSample> samples, const FilmRays& rays,
+                              Visitor* visitor, SampleSink& sink, const Add& add) const {
   using Tracer = PathTracer<double, Visitor>;
   static_assert(kMostTogether <= Tracer::kMostWalks);
   RayCount count;
   Tracer tracer(traced_.context(), count);
   tracer.work_wide(glossy_);
-  const FilmRays rays(scene_, camera_, filter_, samples, mirrored);
   std::vector<typename Tracer::Walk> walks;
   walks.reserve(samples.size());
   for (size_t i = 0; i < samples.size(); ++i) {
@@ -78,7 +84,7 @@ void RadianceEstimator::trace(std::span<const KeyedSample> samples, bool mirrore
   }
   sink.cost(0).add(count);
   sink.cost(0).samples += samples.size();
-  add(walks, samples, weight, sink);
+  add(walks);
 }
 
 template <class Walk>
@@ -105,6 +111,63 @@ void RadianceEstimator::add(const std::vector<Walk>& walks, std::span<const Keye
     sum = sum + radiance * weight;
   }
   leave_pixel();
+}
+
+void RadianceEstimator::add_shared(std::span<const KeyedSample> samples,
+                                   std::span<const SharedPlace* const> places,
+                                   SampleSink& sink) const {
+  std::array<FilmPosition, kMostTogether> on_film;
+  for (size_t i = 0; i < samples.size(); ++i) {
+    on_film[i] = {samples[i].at.x + places[i]->x, samples[i].at.y + places[i]->y};
+  }
+  const FilmRays rays(scene_, camera_, samples, {on_film.data(), samples.size()});
+  const auto add = [&](const auto& walks) {
+    const size_t side = 2 * reach_ + 1;
+    Footprint sums;
+    sums.fill(std::vector<double>(side * side));
+    for (size_t i = 0; i < samples.size(); ++i) {
+      const PixelSample& at = samples[i].at;
+      const Rgb<double>& radiance = walks[i].sums.radiance;
+      if (walks[i].failed || !is_finite(radiance)) {
+        sink.reject(at, slot_name(0));
+      } else {
+        for (int c = 0; c < 3; ++c) {
+          const double amount = radiance[c];
+          for (size_t k = 0; k < side * side; ++k) sums[c][k] += places[i]->weights[k] * amount;
+        }
+      }
+      const bool last = i + 1 == samples.size();
+      if (last || samples[i + 1].at.x != at.x || samples[i + 1].at.y != at.y) {
+        add_footprint(at, sums, sink);
+      }
+    }
+  };
+  if (sink.log()) {
+    PathLog visitor(*sink.log());
+    trace(samples, rays, &visitor, sink, add);
+  } else {
+    trace(samples, rays, static_cast<NoVisitor*>(nullptr), sink, add);
+  }
+}
+
+// The sums are zero afterwards.
+void RadianceEstimator::add_footprint(const PixelSample& at, Footprint& sums,
+                                      SampleSink& sink) const {
+  const Film& film = scene_.film;
+  size_t k = 0;
+  for (int row = -reach_; row <= reach_; ++row) {
+    const int y = at.y - row;
+    const bool in_rows = y >= film.crop_y && y < film.crop_y + film.crop_height;
+    const double of_row = in_rows ? weight_of_cut(film.filter, film.range_y(y)) : 0;
+    for (int column = -reach_; column <= reach_; ++column, ++k) {
+      const int x = at.x - column;
+      if (in_rows && x >= film.crop_x && x < film.crop_x + film.crop_width) {
+        const double weight = of_row * weight_of_cut(film.filter, film.range_x(x));
+        sink.add_radiance({x, y, at.s}, {sums[0][k], sums[1][k], sums[2][k]}, weight);
+      }
+      for (auto& sum : sums) sum[k] = 0;
+    }
+  }
 }
 
 }  // namespace limn

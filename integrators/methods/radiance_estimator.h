@@ -1,17 +1,19 @@
 #pragma once
 // The radiance of a scene as an estimator: images, and differences of images.
+#include <array>
 #include <memory>
 #include <span>
 #include <vector>
 
-#include "integrators/estimates/sample_estimator.h"
+#include "integrators/estimates/shared_place.h"
 #include "integrators/film/film_regions.h"
+#include "integrators/paths/film_rays.h"
 #include "integrators/paths/path.h"
 #include "integrators/paths/traced_scene.h"
 
 namespace limn {
 
-class RadianceEstimator final : public SampleEstimator {
+class RadianceEstimator final : public SharingEstimator {
  public:
   // The scene must outlive the estimator. visible: what its film shows; null: rays tell. closed:
   // what surfaces scatter is known in closed form, InputError if it is not.
@@ -26,16 +28,22 @@ class RadianceEstimator final : public SampleEstimator {
   size_t slots() const override { return 1; }
   const char* slot_name(size_t) const override { return "radiance"; }
   Numbers numbers() const override { return numbers_; }
+  int reach() const override { return reach_; }
   void add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const override;
+  void add_shared(std::span<const KeyedSample> samples, std::span<const SharedPlace* const> places,
+                  SampleSink& sink) const override;
 
  private:
-  template <class Visitor>
-  void trace(std::span<const KeyedSample> samples, bool mirrored, double weight, Visitor* visitor,
-             SampleSink& sink) const;
-  // What the walks of samples have come to.
+  // Calls add(walks) with what the walks of samples have come to.
+  template <class Visitor, class Add>
+  void trace(std::span<const KeyedSample> samples, const FilmRays& rays, Visitor* visitor,
+             SampleSink& sink, const Add& add) const;
   template <class Walk>
   void add(const std::vector<Walk>& walks, std::span<const KeyedSample> samples, double weight,
            SampleSink& sink) const;
+  // Weighted sums of a pixel's samples, for the pixels around it.
+  using Footprint = std::array<std::vector<double>, 3>;
+  void add_footprint(const PixelSample& at, Footprint& sums, SampleSink& sink) const;
 
   const Scene& scene_;
   TracedScene traced_;
@@ -44,6 +52,9 @@ class RadianceEstimator final : public SampleEstimator {
   std::shared_ptr<const FilmRegions> visible_;
   Numbers numbers_;
   bool glossy_;
+  // Errors of neighbours depend on each other where samples are shared, which variances do not tell:
+  // so it is where these are no errors anyway.
+  int reach_ = 0;
 };
 
 }  // namespace limn

@@ -1,6 +1,7 @@
 #pragma once
 // The camera's rays of several samples, in plain numbers: step by step for all of them, like the
 // paths themselves (path.h).
+#include <algorithm>
 #include <array>
 #include <span>
 
@@ -19,6 +20,23 @@ class FilmRays {
       : count_(samples.size()) {
     DCHECK_LE(count_, kMostTogether);
     place(scene, filter, samples, mirrored);
+    start(scene, camera, samples);
+  }
+  // Through given places, one for each sample.
+  FilmRays(const Scene& scene, const CameraView<double>& camera,
+           std::span<const KeyedSample> samples, std::span<const FilmPosition> places)
+      : count_(samples.size()) {
+    DCHECK_LE(count_, kMostTogether);
+    std::copy(places.begin(), places.end(), places_.begin());
+    start(scene, camera, samples);
+  }
+
+  const FilmPosition& place(size_t i) const { return places_[i]; }
+  std::span<const StartRay<double>> starts() const { return {starts_.data(), count_}; }
+
+ private:
+  void start(const Scene& scene, const CameraView<double>& camera,
+             std::span<const KeyedSample> samples) {
     std::array<CameraRay<double>, kMostTogether> rays;
     if (scene.camera.has_lens()) {
       std::array<LensPoint, kMostTogether> lenses;
@@ -33,11 +51,6 @@ class FilmRays {
       starts_[i].direction = rays[i].direction;
     }
   }
-
-  const FilmPosition& place(size_t i) const { return places_[i]; }
-  std::span<const StartRay<double>> starts() const { return {starts_.data(), count_}; }
-
- private:
   void place(const Scene& scene, const FilterTable& filter, std::span<const KeyedSample> samples,
              bool mirrored) {
     std::array<Rng::Stream, kMostTogether> streams;

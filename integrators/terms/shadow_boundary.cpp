@@ -50,8 +50,9 @@ class ShadowTerm final : public Term {
  public:
   explicit ShadowTerm(TermInput& input)
       : context_(input.context),
-        input_(input.edges()),
-        edges_(context_, input_, input.lanes),
+        frames_(context_.scene, input.edges()),
+        input_(frames_.edges()),
+        edges_(context_, frames_, input.lanes),
         lines_(context_, input_) {
     if (edges_.empty() || !is_seen_again()) return;
     const Stopwatch watch;
@@ -119,6 +120,7 @@ class ShadowTerm final : public Term {
   }
 
   const PathContext& context_;
+  LightFrames frames_;
   const EdgeSamplerInput& input_;
   ShadowEdges edges_;
   ShadowLines lines_;

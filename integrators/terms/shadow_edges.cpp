@@ -52,6 +52,13 @@ double lit_side(const Scene& scene, const EdgeMesh& edges, EdgeId edge,
   return blocked[0] == blocked[1] ? 0 : blocked[0] ? 1 : -1;
 }
 
+// The same of a frame, whose corners are the mesh's positions: the side of the corner opposite.
+double inner_side(const EdgeMesh& frame, EdgeId edge, const Vec3d& light) {
+  const auto& [a, b] = frame.edge(edge).vertices;
+  const Vec3d x0 = frame.position(a), normal = cross(x0 - light, frame.position(b) - x0);
+  return dot(normal, frame.positions[(b.index() + 1) % 4] - x0) > 0 ? 1 : -1;
+}
+
 // The distance from a point of a face to the nearest line of its sides.
 double depth_of(const std::array<Vec3d, 3>& corners, const Vec3d& x) {
   double least = std::numeric_limits<double>::infinity();
@@ -71,8 +78,8 @@ Vec3<Dual> moving_vertex(const EdgeMesh& mesh, VertexId vertex) {
   return {{x.x, d.x}, {x.y, d.y}, {x.z, d.z}};
 }
 
-ShadowEdges::ShadowEdges(const PathContext& context, const EdgeSamplerInput& input, int lanes)
-    : context_(context), input_(input), lifted_(context.scene) {
+ShadowEdges::ShadowEdges(const PathContext& context, const LightFrames& frames, int lanes)
+    : context_(context), frames_(frames), input_(frames.edges()), lifted_(context.scene) {
   const Stopwatch watch;
   reach_ = 2 * bounds_of(context_.scene).diagonal();
   for (uint32_t i = 0; i < context_.scene.delta_lights.size(); ++i) {
@@ -87,10 +94,14 @@ void ShadowEdges::list(uint32_t light, ShapeId object) {
   const EdgeMesh& mesh = input_.object(object);
   if (mesh.of_texture()) return;  // they hide nothing
   const DeltaLight& of = *context_.scene.delta_lights[light];
+  const auto frame = frames_.light_of(object);
+  if (frame && *frame != light) return;
   const LightOrigin origin = of.origin();
   for (uint32_t e = 0; e < mesh.edges.size(); ++e) {
     ShadowEdge edge{&of, light, {object, EdgeId(e)}, 0, 0, {}};
-    edge.sign = lit_side(context_.scene, mesh, edge.id.edge, context_.viewpoints->lights[light]);
+    edge.sign =
+        frame ? inner_side(mesh, edge.id.edge, value(of.origin().v))
+              : lit_side(context_.scene, mesh, edge.id.edge, context_.viewpoints->lights[light]);
     if (edge.sign == 0) continue;
     const auto& ends = mesh.edge(edge.id.edge).vertices;
     const Vec3<Dual> y[2] = {moving_vertex(mesh, ends[0]), moving_vertex(mesh, ends[1])};
@@ -222,12 +233,22 @@ std::optional<ShadowPoint> ShadowEdges::choose_crossing(const ShadowLine& line, 
                      at.side, share(received(at))};
 }
 
+// Where the light arrives: on a frame, where it ends, by rounding alone, so hardly inside of it.
+Vec3d ShadowEdges::lit_beside(const ShadowEdge& edge, const ShadowPoint& point) const {
+  if (!frames_.light_of(edge.id.object)) return point.lit;
+  const EdgeMesh& frame = input_.object(edge.id.object);
+  const auto& [a, b] = frame.edge(edge.id.edge).vertices;
+  const Vec3d light = value(edge.light->origin().v);
+  const Vec3d inwards = normalize(cross(frame.position(a) - light, frame.position(b) - light));
+  return point.lit + inwards * (edge.sign * 0x1p-36 * length(point.lit - light));
+}
+
 Rgb<double> ShadowEdges::difference(const ShadowEdge& edge, const ShadowPoint& point,
                                     const Vec3d& q, const Vec3d& omega) const {
   const Scene& scene = context_.scene;
   const auto surface = surface_on_ray<double>(scene, point.face, q, omega);
   const Scattering<double> scattering(surface, -omega, scene.shading);
-  const auto arrival = edge.light->arriving(point.lit);
+  const auto arrival = edge.light->arriving(lit_beside(edge, point));
   if (scattering.black() || !arrival) return {};
   const double along = dot(surface.n_g, omega);
   if (point.side * along > 0) return {};  // the other side is lifted otherwise

@@ -8,6 +8,7 @@
 
 #include "integrators/paths/path.h"
 #include "integrators/terms/lifted_faces.h"
+#include "integrators/terms/light_frames.h"
 #include "limn/core/discrete_distribution.h"
 #include "limn/edgetree/edge_sampler.h"
 
@@ -52,8 +53,8 @@ Vec3<Dual> moving_vertex(const EdgeMesh& mesh, VertexId vertex);
 
 class ShadowEdges {
  public:
-  // lanes: how many derivative lanes of the scene are in use.
-  ShadowEdges(const PathContext& context, const EdgeSamplerInput& input, int lanes);
+  // Of edges and frames. lanes: how many derivative lanes of the scene are in use.
+  ShadowEdges(const PathContext& context, const LightFrames& frames, int lanes);
 
   bool empty() const { return edges_.empty(); }
   size_t size() const { return edges_.size(); }
@@ -78,9 +79,11 @@ class ShadowEdges {
   std::optional<ShadowPoint> choose_crossing(const ShadowLine& line, double s_max,
                                              std::optional<ShadowPoint> on_face, double u) const;
   void list(uint32_t light, ShapeId object);
+  Vec3d lit_beside(const ShadowEdge& edge, const ShadowPoint& point) const;
   void weigh(size_t first, int lanes);
 
   const PathContext& context_;
+  const LightFrames& frames_;
   const EdgeSamplerInput& input_;
   LiftedFaces lifted_;
   double reach_ = 0;  // longer than any line through the scene

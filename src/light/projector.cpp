@@ -5,6 +5,7 @@
 
 #include <limits>
 
+#include "limn/core/framed_light.h"
 #include "limn/core/names.h"
 #include "src/light/types.h"
 
@@ -21,7 +22,7 @@ struct HalfFrame {
   double x, y;
 };
 
-class Projector final : public DeltaLight {
+class Projector final : public FramedLight {
  public:
   // texture: null, or it multiplies the irradiance.
   Projector(const Vec3d& position, const Axes& axes, const Rgb<Dual>& irradiance,
@@ -35,6 +36,16 @@ class Projector final : public DeltaLight {
   std::optional<Arrival<double>> arriving(const Vec3<double>& p) const override { return at(p); }
   std::optional<Arrival<Dual>> arriving(const Vec3<Dual>& p) const override { return at(p); }
   LightOrigin origin() const override { return {position_}; }
+  std::array<Vec3<Dual>, 4> corners() const override {
+    std::array<Vec3<Dual>, 4> corners;
+    const double sides[4][2] = {{1, 1}, {-1, 1}, {-1, -1}, {1, -1}};
+    for (int k = 0; k < 4; ++k) {
+      const Vec3d &a = axes_.left, &b = axes_.up;
+      corners[k] = turned<Dual>(
+          axes_.forward + a * (sides[k][0] * half_.x) + b * (sides[k][1] * half_.y), turn_);
+    }
+    return corners;
+  }
   // At a corner of the frame.
   double power() const override {
     const double corner = 1 + half_.x * half_.x + half_.y * half_.y;

@@ -1,6 +1,8 @@
 // Surfaces, lights and the camera as statements on a tape.
 #include "limn/core/reverse.h"
 
+#include "limn/core/framed_light.h"
+
 namespace limn {
 
 namespace {
@@ -437,6 +439,16 @@ Vec3<Var> light_origin(const DeltaLight& light) {
   if (!copies) return {at.r, at.g, at.b};
   const Rgb<Var> v = of_parameters(
       *copies, at, [](const DeltaLight& seeded) { return as_colour(seeded.origin().v); });
+  return {v.r, v.g, v.b};
+}
+
+Vec3<Var> corner_of_frame(const FramedLight& light, size_t corner) {
+  const Rgb<double> at = as_colour(value(light.corners()[corner]));
+  const auto* copies = Tape::current()->slots()->of(light);
+  if (!copies) return {at.r, at.g, at.b};
+  const Rgb<Var> v = of_parameters(*copies, at, [&](const DeltaLight& seeded) {
+    return as_colour(static_cast<const FramedLight&>(seeded).corners()[corner]);
+  });
   return {v.r, v.g, v.b};
 }
 

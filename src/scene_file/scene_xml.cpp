@@ -204,10 +204,6 @@ class SceneBuilder {
     const auto before = scene_.environment;
     read_light(p, scene_, nullptr);
     p.check_all_used();
-    if (object.type == "projector") {
-      warnings_.push_back(format_warning(
-          object.where, "projector: derivatives of what moves miss the edges of its frame"));
-    }
     if (scene_.environment == before) return;
     only_one(object, "environment", environment_);
     scene_.environment_id = object.id;

@@ -73,7 +73,8 @@ struct Shadows {
       : scene(make(files, lifted)),
         traced(scene, 1, {.edges = true}),
         input(make_scene_edges(scene, 1)),
-        edges(traced.context(), input, 1),
+        frames(scene, input),
+        edges(traced.context(), frames, 1),
         pieces(traced.context(), input, edges.edges(), false, 2) {}
 
   static Scene make(const TempFiles& files, bool lifted) {
@@ -99,6 +100,7 @@ struct Shadows {
   Scene scene;
   TracedScene traced;
   EdgeSamplerInput input;
+  LightFrames frames;
   ShadowEdges edges;
   ShadowPieces pieces;
 };

@@ -154,5 +154,23 @@ TEST(Textures, BitmapOfAProjectorAndASpot) {
   expect_both(spot, "q.cutoff_angle", 64);
 }
 
+// The frame is in view, then seen by way of a wall as well.
+TEST(Textures, FrameOfAProjector) {
+  const std::string projector =
+      "<emitter type=\"projector\" id=\"p\"><transform name=\"to_world\"><lookat "
+      "origin=\"0.4,-0.3,2\" target=\"0,0,0\" up=\"0,1,0\"/></transform><float name=\"fov\" "
+      "value=\"20\"/><rgb name=\"irradiance\" value=\"3,2,1\"/></emitter>";
+  const Scene scene = read(kFloor + projector);
+  expect_both(scene, "p.translate.x", 256);
+  expect_both(scene, "p.translate.z", 256);
+  expect_both(scene, "p.rotate.y", 256);
+  expect_both(scene, "p.rotate.z", 256);
+  expect_both(scene, "floor.translate.z", 256);
+  const std::string wall =
+      "<shape type=\"rectangle\" id=\"wall\"><transform name=\"to_world\"><rotate y=\"1\" "
+      "angle=\"90\"/><translate x=\"-0.6\"/></transform></shape>";
+  expect_both(read(kFloor + wall + projector, 3), "p.rotate.y", 512);
+}
+
 }  // namespace
 }  // namespace limn

@@ -1,9 +1,11 @@
 // What every run promises: the same bits whatever the threads, crops that repeat the full image,
 // honest counts when it is stopped or a sample is not finite.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <bit>
 
+#include "integrators/estimates/shared_place.h"
 #include "limn/integrators/differences.h"
 #include "limn/integrators/gradient.h"
 #include "limn/integrators/render.h"
@@ -61,6 +63,10 @@ TEST_P(Threads, SameBits) {
   const RenderOptions even{.generator = "sobol"};
   expect_same(render(scene, run_settings(4), even).radiance,
               render(scene, run_settings(4, GetParam()), even).radiance);
+  Scene shared = scene;  // samples
+  shared.film.filter = {};
+  expect_same(render(shared, run_settings(4), even).radiance,
+              render(shared, run_settings(4, GetParam()), even).radiance);
   const GradientResult a = run_gradient(scene, run_settings(4));
   const GradientResult b = run_gradient(scene, run_settings(4, GetParam()));
   expect_same(a.radiance, b.radiance);
@@ -278,6 +284,88 @@ TEST(EvenNumbers, MakeImagesWithLessError) {
   }
   EXPECT_LT(true_one, 0.5 * independent);
   EXPECT_GE(compare_moments(images, others).p_largest, 1e-5);
+}
+
+// A sample of an even image serves all pixels whose filters reach it. In the middle of the film
+// images with sample_border, whose samples serve their own pixels alone, have the same expectation.
+TEST(SharedPlaces, MakeImagesWithLessError) {
+  const TempFiles files;
+  constexpr int kBorder = 2;
+  const auto images = [&](const std::string& border) {
+    SceneParts parts = small_scene(files);
+    parts.film = "<rfilter type=\"gaussian\"/>" + border;
+    const Scene scene = make_scene(files, parts);
+    RunSettings settings = run_settings(16);
+    Moments moments(size_t{3} * (parts.width - 2 * kBorder) * (parts.height - 2 * kBorder));
+    for (; settings.seed < 35; ++settings.seed) {
+      const Moments image = render(scene, settings, {.generator = "sobol"}).radiance;
+      std::vector<double> middle;
+      for (int y = kBorder; y < parts.height - kBorder; ++y) {
+        for (int i = 3 * kBorder; i < 3 * (parts.width - kBorder); ++i) {
+          middle.push_back(image.mean(size_t{3} * y * parts.width + i));
+        }
+      }
+      moments.add_batch(middle, 1);
+    }
+    return moments;
+  };
+  const Moments shared = images("");
+  const Moments own = images("<boolean name=\"sample_border\" value=\"true\"/>");
+  double of_shared = 0, of_own = 0;
+  for (size_t i = 0; i < shared.size(); ++i) {
+    of_shared += shared.variance(i);
+    of_own += own.variance(i);
+  }
+  fmt::print("squared error {:.3f} of that of samples for one pixel\n", of_shared / of_own);
+  // Of a gaussian 0.32 pixels count, where noise does not depend on the place.
+  EXPECT_LT(of_shared, 0.6 * of_own);
+  EXPECT_GE(compare_moments(shared, own).p_largest, 1e-5);
+}
+
+// Weights add up to one, and are the filter in the mean: integrals over pixels.
+TEST(SharedPlaces, HaveTheWeightsOfTheFilter) {
+  for (const auto& [kind, radius] : {std::pair{Filter::Kind::kGaussian, 2.0},
+                                     {Filter::Kind::kTent, 1.0},
+                                     {Filter::Kind::kTent, 1.3}}) {
+    Film film;
+    film.filter.kind = kind;
+    film.filter.radius = radius;
+    const int reach = SharedPlace::reach_of(film), side = 2 * reach + 1;
+    ASSERT_GT(reach, 0);
+    Moments moments(static_cast<size_t>(side) * side);
+    for (uint64_t s = 0; s < 20000; ++s) {
+      const SharedPlace place(film.filter, reach, Rng(1, 2, s));
+      const std::vector<double> weights(place.weights.begin(), place.weights.begin() + side * side);
+      double sum = 0;
+      for (const double weight : weights) sum += weight;
+      EXPECT_NEAR(sum, 1, 1e-12);
+      moments.add_batch(weights, 1);
+    }
+    const auto share = [&](int m) {
+      const Filter& f = film.filter;
+      return (f.integral(m + 0.5) - f.integral(m - 0.5)) / f.integral(radius);
+    };
+    std::vector<double> exact;
+    for (int k = 0; k < side * side; ++k) {
+      exact.push_back(share(k / side - reach) * share(k % side - reach));
+    }
+    EXPECT_TRUE(compare_moments(moments, exact).p_largest >= 1e-5);
+  }
+}
+
+// Within two pixels of the border the film cuts filters.
+TEST(SharedPlaces, LeaveConstantsExact) {
+  const TempFiles files;
+  SceneParts parts = small_scene(files);
+  parts.film = "<rfilter type=\"gaussian\"/>";
+  parts.body = "<emitter type=\"constant\"><rgb name=\"radiance\" value=\"0.7\"/></emitter>";
+  const Moments image =
+      render(make_scene(files, parts), run_settings(3), {.generator = "sobol"}).radiance;
+  for (int y = 2; y < parts.height - 2; ++y) {
+    for (int i = 6; i < 3 * (parts.width - 2); ++i) {
+      EXPECT_NEAR(image.mean(size_t{3} * y * parts.width + i), 0.7, 1e-12);
+    }
+  }
 }
 
 TEST(Seeds, Matter) {

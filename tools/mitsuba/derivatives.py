@@ -20,9 +20,9 @@ derivative would have shown, which takes less time and is asked for first.
 
 Results are kept in FOLDER/results.json (out/derivatives) and a later call goes on from there; after
 a change of limn, remove it. The exit status is 1 where a check disagrees, or fewer than --at-least
-agree. Two disagreements in mitsuba-data: edges of a projector's frame are missing (limn warns), and
-the opacity of a textured mask: most texels are 0 or 1, the ends of their range, beyond which
-nothing changes, so that central differences hold half of the slope. With texels inside they agree.
+agree. A disagreement in mitsuba-data: the opacity of a textured mask. Most texels are 0 or 1,
+the ends of their range, beyond which nothing changes, so that central differences hold half of the
+slope. With texels inside they agree.
 """
 
 import argparse

@@ -1,0 +1,48 @@
+// Places of samples that all pixels share, by the filter's quantiles.
+#include "integrators/estimates/shared_place.h"
+
+#include <cmath>
+
+namespace limn {
+namespace {
+
+using Weights = std::array<double, SharedPlace::kMostSide>;
+
+// Returns the place in the pixel for the fraction u of the filter. weights[reach + m]: of the pixel
+// m before it.
+double place(const Filter& filter, int reach, double u, Weights& weights) {
+  const double from_corner = 0.5 + filter.quantile(-filter.radius, filter.radius, u);
+  const double inside = from_corner - std::floor(from_corner);
+  weights = {};
+  double sum = 0;
+  for (int m = -reach; m <= reach; ++m) {
+    sum += weights[reach + m] = filter.eval(inside - 0.5 + m);
+  }
+  for (double& weight : weights) weight /= sum;
+  return inside;
+}
+
+}  // namespace
+
+int SharedPlace::reach_of(const Film& film) {
+  if (film.filter.kind == Filter::Kind::kBox || film.sample_border) return 0;
+  const double reach = std::floor(film.filter.radius + 0.5);
+  return reach <= kMostReach ? static_cast<int>(reach) : 0;
+}
+
+SharedPlace::SharedPlace(const Filter& filter, int reach, const Rng& key) {
+  Rng rng = key.at(Purpose::kFilm, 0);
+  Weights columns, rows;
+  x = place(filter, reach, rng.uniform(), columns);
+  y = place(filter, reach, rng.uniform(), rows);
+  const int side = 2 * reach + 1;
+  for (int i = 0; i < side * side; ++i) weights[i] = rows[i / side] * columns[i % side];
+}
+
+double weight_of_cut(const Filter& filter, const Film::Range& range) {
+  if (range.lower <= -filter.radius && range.upper >= filter.radius) return 1;
+  return filter.integral(filter.radius) /
+         (filter.integral(range.upper) - filter.integral(range.lower));
+}
+
+}  // namespace limn
