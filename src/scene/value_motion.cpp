@@ -3,6 +3,7 @@
 #include <cmath>
 #include <functional>
 
+#include "limn/core/framed_light.h"
 #include "src/scene/motion.h"
 #include "src/scene/motion_lists.h"
 
@@ -82,11 +83,12 @@ void set_unit(ParameterRef::Unit unit, double size, Parameter& parameter) {
   parameter.natural_step = length ? 0.01 * size : 0.01;
 }
 
-// Light comes from another place, or from another direction at all points alike.
+// Light comes from another place, or from another direction at all points alike, or ends elsewhere.
 Moved moved_by(ParameterRef::Unit unit, const DeltaLight& light) {
+  const bool framed = dynamic_cast<const FramedLight*>(&light) != nullptr;
   const bool turns = unit == ParameterRef::Unit::kRadians;
-  return {.delta_lights =
-              unit == ParameterRef::Unit::kLength || (turns && light.origin().infinite)};
+  return {.delta_lights = unit == ParameterRef::Unit::kLength ||
+                          (turns && (framed || light.origin().infinite))};
 }
 
 // Adds the named values of an object. owner: finds the object in a copy of the scene; light: what

@@ -56,8 +56,8 @@ TEST_P(Furnace, RadianceIsKnown) {
   EXPECT_GE(z.p_largest, kLevel);
 }
 
-// The same by even numbers: images of other seeds are independent. Samples serve several pixels; the
-// film cuts the filters of all.
+// The same by even numbers: images of other seeds are independent. Samples serve several pixels;
+// the film cuts the filters of all.
 TEST_P(Furnace, RadianceByEvenNumbersIsKnown) {
   const TempFiles files;
   Scene scene = room(files, GetParam().mesh, GetParam().depth, GetParam().roulette);
