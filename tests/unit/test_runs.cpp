@@ -286,8 +286,8 @@ TEST(EvenNumbers, MakeImagesWithLessError) {
   EXPECT_GE(compare_moments(images, others).p_largest, 1e-5);
 }
 
-// A sample of an even image serves all pixels whose filters reach it. In the middle of the film
-// images with sample_border, whose samples serve their own pixels alone, have the same expectation.
+// A sample of an even image serves all pixels whose filters reach it, but with sample_border its
+// own alone.
 TEST(SharedPlaces, MakeImagesWithLessError) {
   const TempFiles files;
   constexpr int kBorder = 2;
@@ -319,15 +319,6 @@ TEST(SharedPlaces, MakeImagesWithLessError) {
   fmt::print("squared error {:.3f} of that of samples for one pixel\n", of_shared / of_own);
   // Of a gaussian 0.32 pixels count, where noise does not depend on the place.
   EXPECT_LT(of_shared, 0.6 * of_own);
-  std::vector<double> z;
-  for (size_t i = 0; i < shared.size(); ++i) {
-    const double residual = shared.mean(i) - own.mean(i);
-    if (std::fabs(residual) < 1e-9) continue;  // it is constant
-    const double variance = shared.variance(i) + own.variance(i);
-    z.push_back(normal_from_student(residual / std::sqrt(variance), shared.degrees()));
-  }
-  EXPECT_GT(z.size(), shared.size() / 2);
-  EXPECT_GE(summarize(z).p_largest, 1e-5);
 }
 
 // Weights add up to one, and are the filter in the mean: integrals over pixels.
