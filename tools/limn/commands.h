@@ -22,9 +22,9 @@ std::unique_ptr<Command> make_relight_command();
 
 using CommandMaker = std::unique_ptr<Command> (*)();
 inline constexpr CommandMaker kCommands[] = {
-    make_info_command,    make_render_command,     make_gradient_command, make_backward_command,
-    make_fit_command,     make_merge_command,      make_check_command,    make_compare_command,
-    make_reject_command,  make_methods_command,    make_reconstruct_command,
-    make_bake_command,    make_relight_command};
+    make_info_command,   make_render_command,  make_gradient_command,    make_backward_command,
+    make_fit_command,    make_merge_command,   make_check_command,       make_compare_command,
+    make_reject_command, make_methods_command, make_reconstruct_command, make_bake_command,
+    make_relight_command};
 
 }  // namespace limn
