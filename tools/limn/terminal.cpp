@@ -55,7 +55,7 @@ void watch_interrupt() {
 
 std::string progress_line(const std::string& label, double done, double spent) {
   const std::string line = fmt::format("{}: {:3.0f} %", label, 100 * done);
-  if (done < 0.01 || (spent < 3 && done < 1)) return line;
+  if (done < 0.01 || done >= 1 || spent < 3) return line;
   return line + fmt::format(", {} left", duration(spent * (1 - done) / done));
 }
 

@@ -239,8 +239,10 @@ def _load(base: str, camera: Camera, size: int) -> View | None:
     clipped: Any = (image >= _CLIPPED).any(axis=2) & (not file.lower().endswith(".exr"))
     layers = np.concatenate([image * mask[..., None], mask[..., None], clipped[..., None]], axis=2)
     pixels, known, focal, center = _resampled(camera, layers, size)
-    mask = _mended(np.clip(pixels[..., 3], 0, 1), told)
-    known = known & (pixels[..., 4] == 0)
+    given = np.clip(pixels[..., 3], 0, 1)
+    mask = _mended(given, told)
+    # A hole that is filled may be a true one, and its colours are gone: other views tell.
+    known = known & (pixels[..., 4] == 0) & (mask == given)
     if not (mask > 0.5).any() or (mask[known] > 0.5).all():
         what = "empty" if not (mask > 0.5).any() else "white everywhere"
         warnings.warn(f"{told}: the mask is {what}: the view is left out", stacklevel=2)

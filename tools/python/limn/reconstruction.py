@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import copy
+import dataclasses
 import json
 import os
 import sys
@@ -16,12 +17,12 @@ from typing import Any
 
 import numpy as np
 
-from ._limn import LargeSteps
+from ._limn import LargeSteps, load_string
 from .errors import InputError
 from .photo_cameras import read_cameras
 from .photo_fit import PhotoFit, Plan, Progress
 from .photo_hull import checked, visual_hull
-from .photo_model import Model, scenes_of, vertex_normals
+from .photo_model import Model, ply_shape, scenes_of, spread, vertex_normals, write_coloured_ply
 from .photo_output import psnr, rendered, write_model, write_report
 from .photo_views import View, bilinear, read_views
 
@@ -98,32 +99,71 @@ def first_light(model: Model) -> None:
     model.colours = np.clip(model.colours / irradiance[:, None], 0.01, 0.95)
 
 
+def _offsets(model: Model, other: Model) -> Any:
+    """Along the normals to the nearest surface of another model, (V,) [scene units].
+
+    At most a twentieth of the diagonal, which is also taken where a normal meets nothing.
+    """
+    far = 0.05 * model.diagonal
+    with tempfile.TemporaryDirectory(prefix="limn_") as folder, warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        write_coloured_ply(os.path.join(folder, "object.ply"), other.positions, other.faces,
+                           other.colours)  # fmt: skip
+        scene = load_string('<scene version="3.0.0"><sensor type="perspective"/>'
+                            f'{ply_shape("object.ply", "")}</scene>', folder)  # fmt: skip
+    normals = vertex_normals(model.positions, model.faces)
+    # From outside and from inside, so that a surface at the vertex itself is met as well.
+    ways = []
+    for sign in (1.0, -1.0):
+        start = model.positions - sign * far * normals
+        hit = scene.intersect(start, sign * normals)["t"]
+        ways.append(sign * (np.where(hit < 2 * far, hit, 2 * far) - far))
+    return np.where(abs(ways[0]) < abs(ways[1]), ways[0], ways[1])
+
+
+def _refitted(model: Model, views: list[View], seconds: float, steps: int | None, seed: int,
+              threads: int) -> Model:  # fmt: skip
+    """What these views tell: their own hull and steps; light and gloss begin as the model's."""
+    positions, faces = visual_hull(views, _cells(views))
+    colours = spread(model.positions, model.colours, positions)
+    found = dataclasses.replace(copy.deepcopy(model), positions=positions, faces=faces,
+                                colours=colours).remeshed(len(model.faces) // 3)  # fmt: skip
+    for share, stage in ((0.4, _STAGES[0]), (0.6, _STAGES[2])):
+        fit = PhotoFit(found, views, seed, threads)
+        fit.run(Plan(share * seconds, None if steps is None else steps // 2, **stage[3]), "errors")
+    return found
+
+
 def _errors(model: Model, views: Sequence[View], seconds: float, steps: int | None, seed: int,
             threads: int) -> dict[str, Any]:  # fmt: skip
-    """Standard errors by two fits of half of the views each, which start from the model.
+    """Standard errors by two fits, each without another quarter of the views.
 
-    Two estimates of half the data each differ by twice the standard error of one of all data.
-    Squares are means over neighbours: a single difference says little.
+    The jackknife: without d of n views an estimate is off by sqrt(d / (n - d)) standard errors
+    (Shao and Wu 1989), hull and all. Squares are means over the nearest neighbours: a single one
+    says little.
     """
-    halves = []
+    mesh = LargeSteps(model.positions, model.faces, 0.5)
+    position: Any = 0.0
+    colour: Any = 0.0
+    roughness = 0.0
     for k in range(2):
-        fit = PhotoFit(copy.deepcopy(model), views[k::2], seed + k + 1, threads)
-        fit.run(Plan(seconds, None if steps is None else steps // 4, **_STAGES[-1][3]), "errors")
-        halves.append(fit.model)
-    one, two = halves
-    spread = LargeSteps(model.positions, model.faces, 2.0)
-    normals = vertex_normals(model.positions, model.faces)
-    along = ((one.positions - two.positions) * normals).sum(axis=1) / 2
-    colours = (one.colours - two.colours) / 2
-    position = np.sqrt(np.maximum(spread.solve(np.repeat(along[:, None] ** 2, 3, 1))[:, 0], 0))
-    return {"position": position, "colour": np.sqrt(np.maximum(spread.solve(colours**2), 0)),
-            "roughness": abs(one.roughness - two.roughness) / 2}  # fmt: skip
+        kept = [v for i, v in enumerate(views) if i % 4 != 2 * k]
+        other = _refitted(model, kept, seconds, steps, seed + k + 1, threads)
+        scale = len(kept) / (len(views) - len(kept)) / 2
+        position = position + scale * _offsets(model, other) ** 2
+        shown = spread(other.positions, other.colours, model.positions)
+        colour = colour + scale * (shown - model.colours) ** 2
+        roughness += scale * (other.roughness - model.roughness) ** 2
+    position = mesh.solve(np.repeat(position[:, None], 3, 1))[:, 0]
+    return {"position": np.sqrt(np.maximum(position, 0)),
+            "colour": np.sqrt(np.maximum(mesh.solve(colour), 0)),
+            "roughness": roughness**0.5}  # fmt: skip
 
 
 def _write_errors(file: str, errors: dict[str, Any]) -> None:
     told = {
         "about": "standard errors per vertex of object.ply: position along the normal [scene "
-        "units], colour [linear]; from two fits of half of the views each",
+        "units], colour [linear]; from two fits, each without another quarter of the views",
         **{k: np.round(v, 7).tolist() if isinstance(v, np.ndarray) else v
            for k, v in errors.items()},
     }  # fmt: skip
@@ -139,21 +179,25 @@ def _hold_out(views: list[View], count: int | None) -> tuple[list[View], list[Vi
     return views[: len(views) - count], views[len(views) - count :]
 
 
-def _resolution(views: Sequence[View]) -> tuple[int, int]:
-    """(cells a side of the hull's grid, faces at last): as fine as the masks.
+def _cells(views: Sequence[View]) -> int:
+    """Cells a side of the hull's grid: a cell is a pixel."""
+    sides = [max(np.ptp(np.nonzero(v.mask > 0.5), axis=1)) for v in views]
+    return int(np.clip(np.median(sides), 24, 96))
 
-    A cell is a pixel; half of the faces face away, and two are seen in each pixel: with half as
-    many horns of a pixel's width are lost.
+
+def _most_faces(views: Sequence[View], minutes: float) -> int:
+    """As fine as the photographs, which take many views to tell, and as the time allows.
+
+    Half of the faces face away, and five are seen in each pixel. A step's time grows with faces;
+    with 4000 a minute there is time for about a hundred steps.
     """
     areas = [float(v.mask.sum()) for v in views]
-    sides = [max(np.ptp(np.nonzero(v.mask > 0.5), axis=1)) for v in views]
-    return int(np.clip(np.median(sides), 24, 96)), int(np.clip(4 * np.mean(areas), 800, 20000))
+    return int(np.clip(10 * np.mean(areas), 800, min(20000, max(800, 4000 * minutes))))
 
 
-def _fitted(model: Model, used: list[View], minutes: float, steps: Sequence[int | None],
-            seed: int, threads: int, history: list[Progress], tell: Any) -> tuple[Model, bool]:  # fmt: skip
+def _fitted(model: Model, used: list[View], most: int, minutes: float,
+            steps: Sequence[int | None], seed: int, threads: int, history: list[Progress], tell: Any) -> tuple[Model, bool]:  # fmt: skip
     """The model after all stages, and whether Ctrl-C ended them."""
-    most = _resolution(used)[1]
     for (stage, share, faces, how), count in zip(_STAGES, steps):
         model = model.remeshed(int(most * faces))
         if stage == "light":
@@ -176,6 +220,7 @@ def reconstruct(
     *,
     size: int = 128,
     hold_out: int | None = None,
+    faces: int | None = None,
     steps: Sequence[int] | None = None,
     seed: int = 0,
     threads: int = 0,
@@ -192,7 +237,8 @@ def reconstruct(
 
     minutes: what the fit may take; steps: of its four stages, in its place. size: photographs are
     made smaller, to so many pixels on the longer side. hold_out: so many of the last views are kept
-    for judging alone (default: one of eight or more). tell(progress): after each step. Ctrl-C ends
+    for judging alone (default: one of eight or more). faces: of the
+    mesh (default: ten for each of the object's pixels, at most 4000 a minute). tell(progress): after each step. Ctrl-C ends
     the fit; what it has found is written.
 
     The sky's mean is grey, and the 98th percentile of colours is 0.8: photographs cannot tell
@@ -200,19 +246,20 @@ def reconstruct(
     photographs that are left out and of masks with holes.
     """
     folder, out = os.fspath(folder), os.fspath(out)
-    if not (minutes > 0 and size >= 8):
-        raise InputError("minutes must be above 0, and size at least 8")
+    if not (minutes > 0 and size >= 8 and (faces is None or faces >= 100)):
+        raise InputError("minutes must be above 0, size at least 8, and faces at least 100")
     start = time.monotonic()
     views = checked(read_views(folder, size), read_cameras(folder)[1])
     used, held = _hold_out(views, hold_out)
     os.makedirs(out, exist_ok=True)
-    positions, faces = visual_hull(used, _resolution(used)[0])
-    model = Model(positions, faces, np.full((len(positions), 3), 0.5))
+    positions, corners = visual_hull(used, _cells(used))
+    model = Model(positions, corners, np.full((len(positions), 3), 0.5))
     history: list[Progress] = []
     count = [None] * len(_STAGES) if steps is None else list(steps)
     if len(count) != len(_STAGES):
         raise InputError(f"steps: {len(count)} numbers for {len(_STAGES)} stages")
-    model, stopped = _fitted(model, used, minutes, count, seed, threads, history, tell)
+    model, stopped = _fitted(model, used, faces or _most_faces(used, minutes), minutes, count,
+                             seed, threads, history, tell)  # fmt: skip
     errors = {} if stopped else _errors(model, used, 60 * minutes * _ERRORS,
                                         count[-1], seed, threads)  # fmt: skip
     write_model(out, model, views)
@@ -290,14 +337,16 @@ def main(words: Sequence[str]) -> int:
                         help="longer side to which photographs are made smaller (default: 128)")  # fmt: skip
     parser.add_argument("--hold-out", type=int, metavar="N",
                         help="last views kept for judging (default: one of eight or more)")  # fmt: skip
+    parser.add_argument("--faces", type=int, metavar="N",
+                        help="of the mesh (default: by the photographs and the time)")  # fmt: skip
     parser.add_argument("--seed", type=int, default=0, help="of the random numbers (default: 0)")
     parser.add_argument("--threads", type=int, default=0, help="default: all cores")
     given = parser.parse_args(words)
     warnings.showwarning = lambda message, *_: print(f"warning: {message}", file=sys.stderr)
     try:
         found = reconstruct(given.folder, given.output, given.minutes, size=given.size,
-                            hold_out=given.hold_out, seed=given.seed, threads=given.threads,
-                            tell=_teller(given.minutes))  # fmt: skip
+                            hold_out=given.hold_out, faces=given.faces, seed=given.seed,
+                            threads=given.threads, tell=_teller(given.minutes))  # fmt: skip
     except (InputError, OSError) as error:
         print(error, file=sys.stderr)
         return 2
