@@ -1,7 +1,8 @@
 #pragma once
-// What points see of the sky, whatever comes from there: the directions of those that look straight
-// into it, and of others where the lines of LineLight are free. With a map in place of the sky the
-// light that they scatter is a sum over the ends of these ranges (radiance_columns.h).
+// Which directions of the sky points see, independent of the radiance there: single directions of
+// points that look straight into it, and of others the unoccluded ranges of LineLight's lines. With a
+// map in place of the sky the light that they scatter is a sum over the ends of these ranges
+// (radiance_columns.h).
 #include <cmath>
 #include <cstdint>
 #include <span>
@@ -31,9 +32,9 @@ class SkyRecord {
   }
   void end();
 
-  // All of it. 7 numbers of each point: scale, n or direction, and the offset, negative of what
-  // sees the sky itself. Then for each line the angles that ranges begin and end with, upwards,
-  // without beginnings at 0; one angle, 0, where nothing is free. The last is negative.
+  // All of it. Of each point 7 numbers: scale (rgb), n or direction, offset (negative: it looks
+  // straight into the sky). Then of each line the ends of its ranges in ascending order [rad],
+  // without beginnings at 0, or one 0 if it is occluded; the sign bit marks the last.
   const std::vector<float>& numbers() const { return numbers_; }
 
   struct Point {

@@ -18,8 +18,8 @@ struct SharedPlace {
   static constexpr int kMostReach = 3;  // pixels; wider filters would add to too many. Not tuned
   static constexpr int kMostSide = 2 * kMostReach + 1;
 
-  // How many pixels from its own a sample may serve on every side: 0 if it serves its own alone. So
-  // it is of box filters, and of films with sample_border, on whose border there are no samples.
+  // How many pixels from its own a sample may serve on every side: 0 if it serves its own alone, as
+  // with box filters, and with sample_border, which needs samples outside the film.
   static int reach_of(const Film& film);
 
   // key: of this sample of all pixels.
@@ -31,7 +31,7 @@ struct SharedPlace {
   std::array<double, size_t{kMostSide} * kMostSide> weights;
 };
 
-// By what such weights grow where the film cuts a pixel's filter to this range.
+// The factor on such weights where the film cuts a pixel's filter to this range.
 double weight_of_cut(const Filter& filter, const Film::Range& range);
 
 // Estimators of images by such samples.

@@ -50,12 +50,6 @@ std::unique_ptr<SampleEstimator> make_estimator(const Scene& scene, const RunSet
   const ImageMethod& method = *options.method->image;
   const Numbers numbers = numbers_of(options.generator);  // checked for all
   check_points(options.points, method.closed_light, options.method.name());
-  if (method.looks_around && !scene.camera.is_pinhole()) {
-    throw InputError({scene.file},
-                     fmt::format("the method \"{}\" needs a pinhole, a sensor of type "
-                                 "\"perspective\" (\"rays\" takes every sensor)",
-                                 options.method.name()));
-  }
   if (!method.looks_around && options.what != RenderWhat::kImage) {
     throw InputError(
         fmt::format("the method \"{}\" knows radiance alone: how open the sky is say {}",

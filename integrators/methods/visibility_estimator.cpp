@@ -25,6 +25,17 @@ constexpr double kPointCost = 1.5, kListCost = 12, kArcCost = 0.7, kCrossingCost
                  kEvaluationCost = 0.45;
 constexpr uint64_t kPilotSeed = 0x9170;
 
+// The scene, if its camera is one that this looks through: InputError for others.
+const Scene& with_pinhole(const Scene& scene, const RenderOptions& options) {
+  if (!scene.camera.is_pinhole()) {
+    throw InputError({scene.file},
+                     fmt::format("the method \"{}\" needs a pinhole, a sensor of type "
+                                 "\"perspective\" (\"path\" takes every sensor)",
+                                 options.method.name()));
+  }
+  return scene;
+}
+
 void check_doubling(const RenderOptions& options) {
   if (options.tolerance > 0 && 2 * options.lines > kMostLines) {
     throw InputError(
@@ -38,7 +49,7 @@ void check_doubling(const RenderOptions& options) {
 
 VisibilityEstimator::VisibilityEstimator(const Scene& scene, const RunSettings& settings,
                                          const RenderOptions& options)
-    : scene_(scene),
+    : scene_(with_pinhole(scene, options)),
       tracer_(make_embree_tracer(scene, settings.threads)),
       seed_(settings.seed),
       options_(options),

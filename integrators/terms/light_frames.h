@@ -1,6 +1,6 @@
 #pragma once
-// The frames of lights (framed_light.h), as edges close before them that part light from shadow.
-// Rays do not meet them; what they move is found like the shadow of any edge.
+// The borders of framed lights (framed_light.h) as edges just in front of them, across which light
+// ends. Rays do not meet them; they are sampled like the edges of hard shadows.
 #include <optional>
 
 #include "limn/core/framed_light.h"

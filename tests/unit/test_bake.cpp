@@ -234,6 +234,9 @@ TEST(Bake, SaysWhatItDoesNotKnow) {
   scene =
       over_floor(files, {}, false, sky + square("mirror", 1, 0, {0, 1, 0}, conductor("m", 0.1)));
   EXPECT_NE(refused(scene).find("\"mirror\""), std::string::npos);
+  scene = over_floor(files, {}, false, sky);
+  scene.camera.aperture_radius = 0.1;
+  EXPECT_NE(refused(scene).find("needs a pinhole"), std::string::npos);
 
   const BakedView view = bake(over_floor(files, {{cube_mesh()}}, false, sky));
   const auto check = [&](const Scene& now) { return refusal([&] { view.check_scene(now); }); };

@@ -1,5 +1,6 @@
 #pragma once
-// A delta light that ends at once: at a frame, whose sides are planes through it.
+// A delta light whose irradiance ends discontinuously at a rectangular frame, whose sides are planes
+// through the light.
 #include <array>
 
 #include "limn/core/light.h"

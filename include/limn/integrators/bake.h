@@ -28,14 +28,15 @@ struct SkyMap {
 class BakedView {
  public:
   // As `render` with the method lines:azimuths=uniform sees the scene. InputError where that does
-  // not know the scene's light, and for scenes without an environment. lines: as RenderOptions.
+  // not support the scene (max_depth other than 2, textures, gloss, delta lights, other sensors than
+  // pinholes), and for scenes without an environment. lines: as RenderOptions.
   // An interrupted run keeps nothing: `complete` tells.
   struct Made;
   static Made make(const Scene& scene, const RunSettings& settings, int lines);
 
   // A file's bytes: a text of a few lines, the numbers as they lie in memory, the CRC-32 of all.
   std::string bytes() const;
-  // InputError that names the file if it is none, of another version, cut off or damaged.
+  // InputError that names the file if it is no baked view, of another version, cut off or damaged.
   static BakedView of_bytes(const std::string& bytes, const std::string& file);
 
   // The image under a map, height by width by 3: that of the method above for the scene with this
