@@ -47,6 +47,11 @@ void check_scene_and_memory(const Scene& scene, int spp, int lines) {
                      "bake: the scene has no environment that a map could replace: add one, as "
                      "<emitter type=\"constant\"/>");
   }
+  if (scene.max_depth != 2) {
+    throw InputError({scene.file}, fmt::format("bake: direct light alone is kept: set the "
+                                               "integrator's max_depth to 2 (it is {})",
+                                               scene.max_depth));
+  }
   const Film& film = scene.film;
   const double points = static_cast<double>(film.crop_width) * film.crop_height * spp;
   // Two ends of each line, mostly less; in rows, then joined.
@@ -302,6 +307,7 @@ Image BakedView::texel_adjoint(const SkyMap& sky, const Image& adjoint) const {
     throw InputError(fmt::format("the adjoint has {} x {} pixels, the baked view {} x {}",
                                  adjoint.width, adjoint.height, width_, height_));
   }
+  check_finite(adjoint, "", "the adjoint image");
   const Columns map(sky, lines_, 1);
   const Image& texels = sky.texels;
   std::vector<double> sums(static_cast<size_t>(texels.width) * texels.height * 3);

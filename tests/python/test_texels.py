@@ -2,6 +2,7 @@
 
 import json
 import os
+import pickle
 import subprocess
 
 import limn
@@ -94,3 +95,57 @@ def test_a_sky_is_found_back_with_the_programs_bits(folder, sky, tmp_path):
     subprocess.run([*words, str(folder / "sky.xml"), *more, "--steps", "25"], check=True)
     subprocess.run([*words, "--resume", str(tmp_path / "fit"), "--steps", "40"], check=True)
     assert same(limn.read_exr(tmp_path / "fit" / "step_00040_sky.data.exr"), found)
+
+
+BAKED = """<scene version="3.0.0">
+  <integrator type="path"><integer name="max_depth" value="2"/></integrator>
+  <sensor type="perspective">
+    <transform name="to_world"><lookat origin="1,3,5" target="0,0.5,0" up="0,1,0"/></transform>
+    <film type="hdrfilm"><integer name="width" value="16"/><integer name="height" value="12"/></film>
+  </sensor>
+  <shape type="obj" id="tent"><string name="filename" value="tent.obj"/></shape>
+  <shape type="rectangle" id="floor">
+    <transform name="to_world"><rotate x="1" angle="-90"/><scale value="4"/></transform>
+  </shape>
+  <emitter type="constant" id="sky"/>
+</scene>"""
+
+
+def test_a_baked_view_is_the_programs_and_finds_its_sky(folder):
+    texels = np.random.default_rng(4).uniform(0.1, 1, SHAPE).astype(np.float32)
+    (folder / "baked.xml").write_text(BAKED)
+    limn.write_exr(folder / "map.exr", texels)
+    baked = limn.bake(limn.load(folder / "baked.xml"), spp=2, seed=3, lines=16)
+    bake = ["bake", "baked.xml", "--spp", "2", "--seed", "3", "--lines", "16", "-o", "a.bake"]
+    relight = ["relight", "a.bake", "--sky", "map.exr", "--scale", "0.5", "--rotate", "30",
+               "-o", "relit.exr", "--scene", "baked.xml"]
+    for words, told in ((relight, "a.bake: error: cannot read: No such file or directory\n"),
+                        (bake, ""), (relight, "")):
+        done = subprocess.run([os.environ["LIMN_PROGRAM"], *words], cwd=folder, check=False,
+                              capture_output=True, text=True)
+        assert (done.returncode, done.stderr) == (2 if told else 0, told)
+    image = baked.relight(texels, scale=0.5, rotate=30)
+    assert same(image, limn.read_exr(folder / "relit.exr"))
+    # But for the scene's file and the sum of all.
+    assert (folder / "a.bake").read_bytes().split(b"\n\n", 1)[1][:-4] in baked.data
+    assert same(pickle.loads(pickle.dumps(baked)).relight(texels, 0.5, 30), image)
+
+    # Conjugate gradients on |A sky - image|^2. After k steps from 0, |A sky - image| is at most
+    # |A| |texels| / (2 k + 1), whatever A. Here |image|, which is no more than |A| |texels|, is
+    # enough in their place.
+    steps = 60
+    sky = np.zeros(SHAPE)
+    step = rest = baked.adjoint(image, sky, 0.5, 30)
+    for _ in range(steps):
+        curved = baked.adjoint(baked.relight(step, 0.5, 30), sky, scale=0.5, rotate=30)
+        length = np.vdot(rest, rest) / np.vdot(step, curved)
+        sky = sky + length * step
+        new = rest - length * curved
+        step = new + np.vdot(new, new) / np.vdot(rest, rest) * step
+        rest = new
+    left = np.linalg.norm(baked.relight(sky, 0.5, 30) - image)
+    assert left < np.linalg.norm(image) / (2 * steps + 1)
+    with pytest.raises(limn.InputError, match="lines: "):
+        limn.bake(limn.load(folder / "baked.xml"), lines=0)
+    with pytest.raises(limn.InputError, match="data: error: is no file"):
+        limn.Baked(b"hello")

@@ -18,21 +18,22 @@ class BakeCommand final : public Command {
  public:
   const char* name() const override { return "bake"; }
   const char* description() const override {
-    return "Keep what each point of an image sees of the sky, for `limn relight`";
+    return "Keep what each point of an image sees of the sky, for `limn relight`: direct light on "
+           "diffuse surfaces (max_depth 2)";
   }
   void add_options(CLI::App& app) override {
     add_common_options(app, common_);
     app.remove_option(app.get_option("--json"));
     app.add_option("-o,--output", output_, "File to write")->required();
     const OptionAdder add(app);
-    visit_options(options_, only("lines", add));
+    add(lines_, kBakedLinesOption);
   }
   int run(const std::string&) override {
     const Scene scene = load_scene(common_, warnings_);
     check_outputs({{"-o", output_}}, scene);
     const RunSettings settings = make_settings(common_, scene, name());
     const Stopwatch watch;
-    const auto [view, non_finite, complete] = BakedView::make(scene, settings, options_.lines);
+    const auto [view, non_finite, complete] = BakedView::make(scene, settings, lines_);
     if (!complete) {
       fmt::print(stderr, "interrupted: nothing is written\n");
       return kInterrupted;
@@ -49,7 +50,7 @@ class BakeCommand final : public Command {
  private:
   CommonOptions common_;
   Warnings warnings_;
-  RenderOptions options_;
+  int lines_ = RenderOptions().lines;
   std::string output_;
 };
 
@@ -60,7 +61,7 @@ class RelightCommand final : public Command {
     return "The image of a baked view under an environment map, or derivatives for its texels";
   }
   void add_options(CLI::App& app) override {
-    add_input_options(app, common_, "File of limn bake", "FILE");
+    add_input_options(app, common_, "view", "File of `limn bake`", "FILE");
     app.remove_option(app.get_option("--seed"));
     app.add_option("--sky", sky_, "Environment map, as of an envmap")
         ->required()
@@ -105,11 +106,12 @@ class RelightCommand final : public Command {
  private:
   static std::string read_bytes(const std::string& file) {
     std::ifstream stream(file, std::ios::binary);
-    std::string bytes;
     std::error_code error;
-    bytes.resize(std::filesystem::file_size(file, error));
-    if (error || !stream.read(bytes.data(), static_cast<std::streamsize>(bytes.size()))) {
-      throw InputError({file}, "cannot be read");
+    const auto size = std::filesystem::file_size(file, error);
+    std::string bytes(error ? 0 : size, '\0');
+    if (error) throw InputError({file}, "cannot read: " + error.message());
+    if (!stream.read(bytes.data(), static_cast<std::streamsize>(size))) {
+      throw InputError({file}, "cannot read the file");
     }
     return bytes;
   }

@@ -390,7 +390,7 @@ class RejectProgram final : public Command {
     return "Draw and measure which edges the samplers reject, accept and falsely accept";
   }
   void add_options(CLI::App& app) override {
-    add_input_options(app, common_, "Scene file, or a mesh (.obj, .ply)", "SCENE|MESH");
+    add_input_options(app, common_, "scene", "Scene file, or a mesh (.obj, .ply)", "SCENE|MESH");
     add_reject_options(app, command_);
   }
   int run(const std::string& command_line) override {

@@ -41,9 +41,9 @@ std::vector<std::string> split(const std::string& list) {
 
 }  // namespace
 
-void add_input_options(CLI::App& app, CommonOptions& common, const std::string& text,
-                       const std::string& type) {
-  app.add_option("scene", common.scene, text)->required()->type_name(type);
+void add_input_options(CLI::App& app, CommonOptions& common, const std::string& name,
+                       const std::string& text, const std::string& type) {
+  app.add_option(name, common.scene, text)->required()->type_name(type);
   app.add_option_function<std::vector<std::string>>(
          "-D",
          [&common](const std::vector<std::string>& defines) {
@@ -57,7 +57,7 @@ void add_input_options(CLI::App& app, CommonOptions& common, const std::string& 
 }
 
 void add_common_options(CLI::App& app, CommonOptions& common) {
-  add_input_options(app, common, "Scene file (Mitsuba 3 XML)", "SCENE");
+  add_input_options(app, common, "scene", "Scene file (Mitsuba 3 XML)", "SCENE");
   app.add_option("--path", common.paths,
                  "Directory where files of the scene are searched last (repeatable)")
       ->type_name("DIR")

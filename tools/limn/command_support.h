@@ -30,9 +30,9 @@ struct CommonOptions {
   std::string part;      // "K/N" of --part; "": the whole run
 };
 
-// Scene or mesh, -D, --seed, --threads, --quiet. text, type: of the input.
-void add_input_options(CLI::App& app, CommonOptions& common, const std::string& text,
-                       const std::string& type);
+// Scene or mesh, -D, --seed, --threads, --quiet. name, text, type: of the input.
+void add_input_options(CLI::App& app, CommonOptions& common, const std::string& name,
+                       const std::string& text, const std::string& type);
 // These and --spp, --json, --shading, --smooth-as.
 void add_common_options(CLI::App& app, CommonOptions& common);
 // --wrt

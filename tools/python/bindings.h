@@ -60,6 +60,7 @@ void bind_parts(nb::module_& m);
 void bind_render(nb::module_& m);
 void bind_gradient(nb::module_& m);
 void bind_backward(nb::module_& m);
+void bind_bake(nb::module_& m);
 void bind_fit(nb::module_& m);
 void bind_check(nb::module_& m);
 void bind_compare(nb::module_& m);

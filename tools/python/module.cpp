@@ -35,6 +35,7 @@ NB_MODULE(_limn, m) {
   py::bind_render(m);
   py::bind_gradient(m);
   py::bind_backward(m);
+  py::bind_bake(m);
   py::bind_fit(m);
   py::bind_check(m);
   py::bind_compare(m);

@@ -11,6 +11,7 @@
 
 #include "limn/core/image.h"
 #include "limn/core/scene.h"
+#include "limn/integrators/option.h"
 #include "limn/integrators/run.h"
 
 namespace limn {
@@ -24,6 +25,8 @@ struct SkyMap {
   // that the scene was baked with, if it had one [degrees].
   double turn = 0;
 };
+
+inline constexpr Option kBakedLinesOption{"lines", "Lines through the sky per point", 1, 1 << 14};
 
 class BakedView {
  public:
@@ -42,8 +45,9 @@ class BakedView {
   // The image under a map, height by width by 3: that of the method above for the scene with this
   // map, but for rounding to floats. InputError for maps that are not finite.
   Image relight(const SkyMap& sky, int threads) const;
-  // dLoss/dtexels, of the size of the map, from dLoss/dimage (InputError for other sizes): the
-  // transpose of `relight`. The texels themselves do not matter.
+  // dLoss/dtexels, of the size of the map, from dLoss/dimage: the transpose of
+  // `relight`. The texels themselves do not matter. InputError for images of other sizes and for
+  // what is not finite.
   Image texel_adjoint(const SkyMap& sky, const Image& adjoint) const;
 
   // InputError if the scene, but for its environment, is not the one that was baked.

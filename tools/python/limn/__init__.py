@@ -12,6 +12,7 @@ from . import _processor
 
 __path__[:0] = _processor.choose()  # before what it checks for
 from ._limn import (  # noqa: E402
+    Baked,
     Check,
     ComparedMethod,
     Comparison,
@@ -26,6 +27,7 @@ from ._limn import (  # noqa: E402
     Scene,
     TimeBudget,
     backward,
+    bake,
     check,
     compare,
     gradient,
@@ -55,6 +57,7 @@ from .parts import Part, merge, part
 from .reconstruction import Reconstruction, reconstruct
 
 __all__ = [
+    "Baked",
     "Check",
     "ComparedMethod",
     "Comparison",
@@ -75,6 +78,7 @@ __all__ = [
     "Transform",
     "UnknownParameterError",
     "backward",
+    "bake",
     "check",
     "compare",
     "fit",
