@@ -399,10 +399,12 @@ TEST_F(Program, UnknownNamesListTheKnown) {
   EXPECT_NE(refused(gradient + " --terms interior,border").find("boundary"), std::string::npos);
   EXPECT_NE(refused("render " + scene_ + " --shading phong -o " + out()).find("continuous"),
             std::string::npos);
-  EXPECT_NE(refused("paint " + scene_)
-                .find("limn paint: no such command (known: info, render, gradient, backward, fit, "
-                      "merge, check, compare, reject, methods; limn --help tells more)"),
-            std::string::npos);
+  EXPECT_NE(
+      refused("paint " + scene_)
+          .find("limn paint: no such command (known: info, render, gradient, backward, fit, "
+                "merge, check, compare, reject, methods, reconstruct, bake, relight; limn --help "
+                "tells more)"),
+      std::string::npos);
   EXPECT_NE(refused("").find("limn: a command is needed (known: info"), std::string::npos);
 }
 
