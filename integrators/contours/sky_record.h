@@ -1,7 +1,7 @@
 #pragma once
 // Which directions of the sky points see, independent of the radiance there: single directions of
-// points that look straight into it, and of others the unoccluded ranges of LineLight's lines. With a
-// map in place of the sky the light that they scatter is a sum over the ends of these ranges
+// points that look straight into it, and of others the unoccluded ranges of LineLight's lines. With
+// a map in place of the sky the light that they scatter is a sum over the ends of these ranges
 // (radiance_columns.h).
 #include <cmath>
 #include <cstdint>
