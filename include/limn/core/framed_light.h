@@ -1,6 +1,6 @@
 #pragma once
-// A delta light whose irradiance ends discontinuously at a rectangular frame, whose sides are planes
-// through the light.
+// A delta light whose irradiance ends discontinuously at a rectangular frame, whose sides are
+// planes through the light.
 #include <array>
 
 #include "limn/core/light.h"

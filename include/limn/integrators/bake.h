@@ -31,8 +31,8 @@ inline constexpr Option kBakedLinesOption{"lines", "Lines through the sky per po
 class BakedView {
  public:
   // As `render` with the method lines:azimuths=uniform sees the scene. InputError where that does
-  // not support the scene (max_depth other than 2, textures, gloss, delta lights, other sensors than
-  // pinholes), and for scenes without an environment. lines: as RenderOptions.
+  // not support the scene (max_depth other than 2, textures, gloss, delta lights, other sensors
+  // than pinholes), and for scenes without an environment. lines: as RenderOptions.
   // An interrupted run keeps nothing: `complete` tells.
   struct Made;
   static Made make(const Scene& scene, const RunSettings& settings, int lines);
@@ -45,9 +45,9 @@ class BakedView {
   // The image under a map, height by width by 3: that of the method above for the scene with this
   // map, but for rounding to floats. InputError for maps that are not finite.
   Image relight(const SkyMap& sky, int threads) const;
-  // dLoss/dtexels, of the size of the map, from dLoss/dimage: the transpose of
-  // `relight`. The texels themselves do not matter. InputError for images of other sizes and for
-  // what is not finite.
+  // dLoss/dtexels, of the size of the map, from dLoss/dimage: the transpose of `relight`.
+  // The texels themselves do not matter. InputError for images of other sizes and for what is not
+  // finite.
   Image texel_adjoint(const SkyMap& sky, const Image& adjoint) const;
 
   // InputError if the scene, but for its environment, is not the one that was baked.
