@@ -101,7 +101,10 @@ std::unique_ptr<const FlatMirrors> FlatMirrors::make(const Scene& scene) {
   std::stable_sort(mirrors.begin(), mirrors.end(), [](const Mirror& a, const Mirror& b) {
     return a.area * std::max(a.share, a.passes) > b.area * std::max(b.share, b.passes);
   });
-  if (mirrors.size() > kMost) mirrors.erase(mirrors.begin() + kMost, mirrors.end());
+  if (mirrors.size() > kMost) {
+    result->left_out_ = mirrors.size() - kMost;
+    mirrors.erase(mirrors.begin() + kMost, mirrors.end());
+  }
   const auto count = static_cast<uint32_t>(mirrors.size());
   for (uint32_t a = 0; a < count; ++a) result->chains_.push_back({{a, 0}, 1});
   for (uint32_t a = 0; a < count; ++a) {

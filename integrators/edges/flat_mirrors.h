@@ -63,6 +63,8 @@ class FlatMirrors {
   static std::unique_ptr<const FlatMirrors> make(const Scene& scene);
 
   std::span<const Mirror> mirrors() const { return mirrors_; }
+  // How many there are beside those.
+  size_t left_out() const { return left_out_; }
   // Of one mirror each, then of two different ones.
   std::span<const Chain> chains() const { return chains_; }
   // Of one plane each that refracts, then of two parallel ones.
@@ -86,6 +88,7 @@ class FlatMirrors {
 
   const Scene& scene_;
   std::vector<Mirror> mirrors_;
+  size_t left_out_ = 0;
   std::vector<Chain> chains_, panes_;
 };
 

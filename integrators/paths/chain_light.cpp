@@ -10,6 +10,7 @@
 #include "integrators/paths/camera_path.h"
 #include "integrators/paths/path_follow.h"
 #include "limn/core/duplicate_faces.h"
+#include "limn/core/framed_light.h"
 #include "limn/core/names.h"
 
 namespace limn {
@@ -59,6 +60,8 @@ bool values_move(const Scene& seeded) {
   if (!CameraView<Dual>(seeded.camera).is_constant()) return true;
   for (const auto& light : seeded.delta_lights) {
     if (!is_constant(light->origin().v)) return true;
+    const auto* framed = dynamic_cast<const FramedLight*>(light.get());
+    if (framed && !is_constant(framed->corners().front())) return true;
   }
   const Vec3<Dual> n{0.0, 0.0, 1.0}, wi{0.6, 0.0, 0.8};
   for (const Shape& shape : seeded.shapes) {
@@ -73,6 +76,21 @@ bool values_move(const Scene& seeded) {
     }
   }
   return false;
+}
+
+// Of more flat mirrors and panes than edges are looked for in: which ones count.
+std::string of_flat_mirrors(const PathContext& context, const Scene& scene) {
+  const FlatMirrors* const flat = context.flat_mirrors;
+  if (!flat || flat->left_out() == 0) return "";
+  std::vector<std::string> names;
+  for (const auto& mirror : flat->mirrors()) {
+    const std::string name = quoted_name(scene, mirror.faces.front().shape);
+    if (std::ranges::find(names, name) == names.end()) names.push_back(name);
+  }
+  return fmt::format(
+      "; of {} flat mirrors and panes only the {} with the most area times reflectance show edges, "
+      "those of {}: where another matters more, make one of these rough",
+      flat->mirrors().size() + flat->left_out(), flat->mirrors().size(), join(names));
 }
 
 }  // namespace
@@ -104,8 +122,9 @@ std::string missing_by_chains(const PathContext& context, const Scene& scene,
   const size_t more = light.shapes.size() - names.size();
   return fmt::format(
       "the derivative is not complete: edges seen by way of smooth lobes of {}{} are missing; "
-      "{:.2g} % of the image's light comes that way (smooth_as of 0.003 makes them rough)",
-      join(names), more > 0 ? fmt::format(" and {} more", more) : "", 100 * light.share);
+      "{:.2g} % of the image's light comes that way (smooth_as of 0.003 makes them rough){}",
+      join(names), more > 0 ? fmt::format(" and {} more", more) : "", 100 * light.share,
+      of_flat_mirrors(context, scene));
 }
 
 }  // namespace limn

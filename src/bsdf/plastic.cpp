@@ -4,6 +4,7 @@
 // with 1 - R for 1 - rho R unless `nonlinear`, and the coat a smooth lobe of weight ks F(cos_i).
 #include <fmt/format.h>
 
+#include "limn/core/make_bsdf.h"
 #include "src/bsdf/both_scalars.h"
 #include "src/bsdf/cosine.h"
 #include "src/bsdf/fresnel.h"
@@ -94,9 +95,15 @@ std::shared_ptr<Bsdf> read_plastic(Properties& properties) {
   const double eta = read_relative_ior(properties, "polypropylene");
   if (!(eta > 1)) properties.fail("int_ior", "int_ior must be greater than ext_ior");
   const bool nonlinear = properties.boolean("nonlinear", false);
-  return std::make_shared<Plastic>(eta, nonlinear,
-                                   read_reflectance(properties, "diffuse_reflectance", 0.5),
-                                   read_reflectance(properties, "specular_reflectance", 1));
+  const ConstantOrTexture diffuse = read_reflectance(properties, "diffuse_reflectance", 0.5),
+                          specular = read_reflectance(properties, "specular_reflectance", 1);
+  // For any alpha its base is darker, by 1 to 5 % where nothing is absorbed and eta is 1.3 to 1.9:
+  // Mitsuba has R as a sum over 64 cosines there, as a fit here.
+  if (const double alpha = properties.smooth_as(); alpha > 0) {
+    return make_roughplastic(
+        {RoughConductorValues::Distribution::kGgx, alpha, eta, nonlinear, diffuse, specular});
+  }
+  return std::make_shared<Plastic>(eta, nonlinear, diffuse, specular);
 }
 
 }  // namespace limn

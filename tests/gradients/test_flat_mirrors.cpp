@@ -171,6 +171,21 @@ TEST(FlatMirrors, WhatIsMissingIsTold) {
                                      false, 0.3, {0.9, 0.4, 0.3}, "<ref id=\"silver\"/>");
   const std::string line = warned(corner(files, ball));
   EXPECT_NE(line.find("\"ball\""), line.npos) << line;
+  // Two small mirrors are seen beside the wall and the side; of three one is not.
+  const auto with = [&](const std::vector<std::string>& names) {
+    std::string small;
+    for (const std::string& name : names) {
+      const double size = 0.02 * static_cast<double>(name.size());
+      small += square(name, size, 90, {0.5, 4 * size, 0.8}, "<ref id=\"silver\"/>");
+    }
+    return warned(corner(files, ball + small));
+  };
+  EXPECT_EQ(with({"least", "larger"}).find("flat mirrors"), std::string::npos);
+  const std::string five = with({"least", "largest", "larger"});
+  EXPECT_NE(five.find("of 5 flat mirrors and panes only the 4 with the most area times reflectance "
+                      "show edges, those of \"side\", \"wall\", \"largest\", \"larger\":"),
+            five.npos)
+      << five;
 }
 
 std::unique_ptr<const FlatMirrors> mirrors_of(const Scene& scene, const std::string& parameter) {

@@ -154,13 +154,14 @@ TEST(Textures, BitmapOfAProjectorAndASpot) {
   expect_both(spot, "q.cutoff_angle", 64);
 }
 
+const std::string kProjector =
+    "<emitter type=\"projector\" id=\"p\"><transform name=\"to_world\"><lookat "
+    "origin=\"0.4,-0.3,2\" target=\"0,0,0\" up=\"0,1,0\"/></transform><float name=\"fov\" "
+    "value=\"20\"/><rgb name=\"irradiance\" value=\"3,2,1\"/></emitter>";
+
 // The frame is in view, then seen by way of a wall as well.
 TEST(Textures, FrameOfAProjector) {
-  const std::string projector =
-      "<emitter type=\"projector\" id=\"p\"><transform name=\"to_world\"><lookat "
-      "origin=\"0.4,-0.3,2\" target=\"0,0,0\" up=\"0,1,0\"/></transform><float name=\"fov\" "
-      "value=\"20\"/><rgb name=\"irradiance\" value=\"3,2,1\"/></emitter>";
-  const Scene scene = read(kFloor + projector);
+  const Scene scene = read(kFloor + kProjector);
   expect_both(scene, "p.translate.x", 256);
   expect_both(scene, "p.translate.z", 256);
   expect_both(scene, "p.rotate.y", 256);
@@ -169,7 +170,21 @@ TEST(Textures, FrameOfAProjector) {
   const std::string wall =
       "<shape type=\"rectangle\" id=\"wall\"><transform name=\"to_world\"><rotate y=\"1\" "
       "angle=\"90\"/><translate x=\"-0.6\"/></transform></shape>";
-  expect_both(read(kFloor + wall + projector, 3), "p.rotate.y", 512);
+  expect_both(read(kFloor + wall + kProjector, 3), "p.rotate.y", 512);
+}
+
+// A ball shows the frame as well: its motion there is missing.
+TEST(Textures, FrameOfAProjectorInAMirror) {
+  const std::string ball =
+      "<shape type=\"sphere\"><point name=\"center\" value=\"0.4,0.4,0.3\"/><float "
+      "name=\"radius\" value=\"0.3\"/><bsdf type=\"conductor\"/></shape>";
+  const auto incomplete = [](const Scene& scene, const std::string& parameter) {
+    return run_check(scene, parameter, 8).gradient.incomplete;
+  };
+  EXPECT_FALSE(incomplete(read(kFloor + kProjector), "p.rotate.y"));
+  const Scene scene = read(kFloor + ball + kProjector);
+  EXPECT_TRUE(incomplete(scene, "p.rotate.y"));
+  EXPECT_FALSE(incomplete(scene, "p.irradiance"));
 }
 
 }  // namespace

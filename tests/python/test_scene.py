@@ -27,6 +27,27 @@ def test_keywords_give_values_to_names(folder):
     assert image(scene).shape == (12, 24, 3)
 
 
+def test_smooth_lobes_are_made_rough(tmp_path):
+    def write(name, kind, alpha=""):
+        (tmp_path / name).write_text(f"""<scene version="3.0.0">
+  <sensor type="perspective"><film type="hdrfilm"><integer name="width" value="8"/>
+    <integer name="height" value="8"/></film></sensor>
+  <shape type="rectangle"><transform name="to_world"><translate z="4"/></transform>
+    <bsdf type="twosided"><bsdf type="{kind}">{alpha}</bsdf></bsdf></shape>
+  <emitter type="constant"><rgb name="radiance" value="$light"/></emitter></scene>""")
+        return tmp_path / name
+
+    alpha = '<float name="alpha" value="0.2"/><string name="distribution" value="ggx"/>'
+    for kind in ("conductor", "plastic"):
+        smooth = write("smooth.xml", kind)
+        scene = limn.load(smooth, smooth_as=0.2, light=0.5)
+        rough = limn.load(write("rough.xml", f"rough{kind}", alpha), light=0.5)
+        assert (scene.smooth_as, rough.smooth_as, limn.load(smooth, light=0.5).smooth_as) == (
+            0.2, 0, 0)
+        assert same(image(scene), image(rough))
+        assert not same(image(scene), image(limn.load(smooth, light=0.5)))
+
+
 def test_text_is_as_good_as_a_file(folder, scene):
     assert same(image(limn.load_string(SCENE, folder)), image(scene))
     broken = SCENE.replace("</scene>", "<lamp/></scene>")
@@ -39,6 +60,8 @@ def test_text_is_as_good_as_a_file(folder, scene):
     (lambda s, f: limn.load(f / "no.xml"), "{f}/no.xml: error: cannot read the file"),
     (lambda s, f: limn.load(f / "scene.xml", sise=3),
      '{f}/scene.xml: error: -D sise=3: the scene has no parameter "$sise" (known: alpha, size)'),
+    (lambda s, f: limn.load(f / "scene.xml", smooth_as=2),
+     "error: smooth_as: must be 0, or lie between 0.0001 and 1"),
     (lambda s, f: s.__setitem__("metal.alpha", -1),
      '{f}/scene.xml: error: parameter "metal.alpha" cannot be -1: it must be finite and lie in '
      "[0, 1e+06]"),

@@ -61,8 +61,10 @@ class TestProperties final : public Properties {
     return textures.empty() ? nullptr : textures.begin()->second;
   }
   std::vector<std::shared_ptr<Bsdf>> bsdfs() override { return bsdfs_; }
+  double smooth_as() const override { return roughness; }
 
   std::map<std::string, std::shared_ptr<Texture>> textures;
+  double roughness = 0;  // see smooth_as
 
  private:
   template <class T>

@@ -4,7 +4,10 @@
 #include <functional>
 
 #include "limn/core/make_bsdf.h"
+#include "limn/core/rng.h"
+#include "src/bsdf/fresnel.h"
 #include "support/bsdf_cases.h"
+#include "support/running_mean.h"
 #include "support/test_properties.h"
 
 namespace limn {
@@ -264,6 +267,78 @@ TEST(SmoothLobes, ClonesHaveSidesOfTheirOwn) {
         }
       }
       EXPECT_TRUE(differs || c.name == "null" || c.name == "conductor") << c.name;
+    }
+  }
+}
+
+// The light that a rough plastic's base reflects over that of a smooth one's, as alpha goes to 0:
+// Mitsuba has the inner reflectance as a sum for one, as a fit for the other.
+double ratio_of_bases(double rho, double eta) {
+  constexpr int kCosines = 64;
+  double sum = 0;
+  for (int i = 0; i < kCosines; ++i) {
+    const double z = i / (kCosines - 1.0);
+    sum += fresnel_dielectric<double>(z, 1 / eta).reflected * z * 2 / kCosines;
+  }
+  return (1 - rho * inner_diffuse_reflectance(eta)) / (1 - rho * sum);
+}
+
+// What the rough part reflects of light along wi, in green.
+double rough_albedo(const Bsdf& bsdf, const Vec3d& wi) {
+  constexpr int kSteps = 4000;
+  double sum = 0;
+  for (int i = 0; i < kSteps; ++i) {
+    const double cos_o = (i + 0.5) / kSteps;
+    sum += bsdf.eval_with_pdf(kNormal, wi, around(kNormal, std::acos(cos_o), 2)).value.g;
+  }
+  return sum * 2 * kPi / kSteps;
+}
+
+// Made rough, they reflect and refract as much in the limit, but for that ratio.
+TEST(SmoothLobes, AreLimitsOfRoughOnes) {
+  constexpr double kAlpha = 1e-4, kEta = 1.5, kRho = 0.6;
+  // The mean square of the normals' slopes, about: what they change is of second order.
+  const double slopes = -kAlpha * kAlpha * std::log(kAlpha);
+  const std::map<std::string, TestProperties::Value> glass{{"int_ior", kEta}, {"ext_ior", 1.0}};
+  auto coat = glass;
+  coat["diffuse_reflectance"] = kRho;
+  coat["specular_reflectance"] = 0.7;
+  auto nonlinear = coat;
+  nonlinear["nonlinear"] = true;
+  struct Case {
+    std::string type;
+    std::map<std::string, TestProperties::Value> values;
+    double base;  // of the rough one's rough part over that of the smooth one
+  };
+  Rng rng(5, 0, 0);
+  for (const Case& c : {Case{"conductor", {{"material", "Cu"}}, 1}, Case{"dielectric", glass, 1},
+                        Case{"plastic", coat, ratio_of_bases(1, kEta)},
+                        Case{"plastic", nonlinear, ratio_of_bases(kRho, kEta)}}) {
+    TestProperties properties("bsdf", c.type, c.values);
+    const auto smooth = make_bsdf(properties);
+    properties.roughness = kAlpha;
+    const auto rough = make_bsdf(properties);
+    ASSERT_FALSE(rough->side(true)->lobes().smooth) << c.type;
+    for (const double polar : {0.1, 0.7, 1.2}) {
+      const Vec3d wi = around(kNormal, polar, 0.7);
+      double exact = smooth->is_rough() ? c.base * rough_albedo(*smooth->side(true), wi) : 0;
+      SmoothRays<double> rays;
+      const int count = smooth->side(true)->smooth_rays(kNormal, wi, rays);
+      for (int k = 0; k < count; ++k) exact += rays[k].weight.g;
+      RunningMean mean;
+      for (int s = 0; s < 20000; ++s) {
+        const double u = rng.uniform(), v = rng.uniform();
+        const auto wo = rough->side(true)->sample(kNormal, wi, u, v);
+        if (!wo) {
+          mean.add(0);
+          continue;
+        }
+        const BsdfValue at = rough->side(true)->eval_with_pdf(kNormal, wi, *wo);
+        mean.add(at.pdf > 0 ? at.value.g / at.pdf : 0);
+      }
+      EXPECT_LT(std::fabs(mean.mean() - exact), 4.5 * mean.standard_error() + slopes)
+          << c.type << " at " << polar << ": " << mean.mean() << " +- " << mean.standard_error()
+          << ", " << exact;
     }
   }
 }

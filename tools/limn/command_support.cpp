@@ -74,8 +74,9 @@ void add_common_options(CLI::App& app, CommonOptions& common) {
       ->check(CLI::IsMember({"continuous", "mitsuba"}))
       ->capture_default_str();
   app.add_option("--smooth-as", common.smooth_as,
-                 "Make smooth conductors and dielectrics rough (GGX), so that derivatives have all "
-                 "edges: another image, by about this roughness (0.003)")
+                 "Make smooth conductors, dielectrics and plastics rough (GGX), so that "
+                 "derivatives have all edges: another image, by about this roughness (0.003), and "
+                 "plastics a few percent darker")
       ->check(within(1e-4, 1))
       ->type_name("ALPHA");
 }

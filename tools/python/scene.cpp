@@ -7,6 +7,7 @@
 #include <map>
 
 #include "limn/core/error.h"
+#include "limn/core/field_error.h"
 #include "limn/core/names.h"
 #include "limn/core/parameter.h"
 #include "limn/core/set_shading.h"
@@ -86,11 +87,15 @@ SceneHandle read(const Read& read_it) {
   return std::move(*scene);
 }
 
-SceneHandle load(nb::handle file, const nb::kwargs& substitutions) {
+SceneHandle load(nb::handle file, double smooth_as, const nb::kwargs& substitutions) {
   const std::string path = to_path("file", file);
+  if (smooth_as != 0 && !(smooth_as >= 1e-4 && smooth_as <= 1)) {
+    throw FieldError("smooth_as", "must be 0, or lie between 0.0001 and 1");
+  }
   const auto defines = to_defines(substitutions);
-  return read(
-      [&](std::vector<std::string>* warnings) { return read_scene(path, defines, warnings); });
+  return read([&](std::vector<std::string>* warnings) {
+    return read_scene(path, defines, warnings, {}, smooth_as);
+  });
 }
 
 SceneHandle load_string(const std::string& xml, nb::handle folder,
@@ -258,6 +263,10 @@ nb::class_<SceneHandle> bind_scene(nb::module_& m) {
           "seed", [](const SceneHandle& s) { return s.get().seed; },
           "The seed that the file asks for.")
       .def_prop_ro(
+          "smooth_as", [](const SceneHandle& s) { return s.get().smooth_as; },
+          "The roughness that its smooth conductors, dielectrics and plastics were given, see "
+          "load(); 0: none.")
+      .def_prop_ro(
           "sensors",
           [](const SceneHandle& s) {
             std::vector<std::string> ids;
@@ -272,11 +281,15 @@ nb::class_<SceneHandle> bind_scene(nb::module_& m) {
           "How interpolated normals shade: \"continuous\", or \"mitsuba\", whose jumps are "
           "missing from gradients.")
       .def("__repr__", repr);
-  m.def("load", load, nb::arg("file"), nb::arg("substitutions"),
-        nb::sig("def load(file: str | os.PathLike[str], **substitutions: object) -> Scene"),
+  m.def("load", load, nb::arg("file"), nb::kw_only(), nb::arg("smooth_as") = 0.0,
+        nb::arg("substitutions"),
+        nb::sig("def load(file: str | os.PathLike[str], *, smooth_as: float = 0, **substitutions: "
+                "object) -> Scene"),
         "Reads a scene file, the subset of Mitsuba 3's XML that scenes/README.md describes.\n\n"
-        "Keywords give values to its $names, as -D does: limn.load(\"demo.xml\", width=64). Raises "
-        "limn.InputError with file, line and column.");
+        "Keywords give values to its $names, as -D does: limn.load(\"demo.xml\", width=64). "
+        "smooth_as: the roughness (GGX) that smooth conductors, dielectrics and plastics get, so "
+        "that derivatives have all edges (0.003), plastics a few percent darker; 0: they stay "
+        "smooth. Raises limn.InputError with file, line and column.");
   m.def("load_string", load_string, nb::arg("xml"), nb::arg("folder") = "",
         nb::arg("substitutions"),
         nb::sig("def load_string(xml: str, folder: str | os.PathLike[str] = '', **substitutions: "
