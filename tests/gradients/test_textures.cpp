@@ -182,7 +182,7 @@ TEST(Textures, FrameOfAProjectorInAMirror) {
     return run_check(scene, parameter, 8).gradient.incomplete;
   };
   EXPECT_FALSE(incomplete(read(kFloor + kProjector), "p.rotate.y"));
-  const Scene scene = read(kFloor + ball + kProjector);
+  const Scene scene = read(kFloor + ball + kProjector, 3);
   EXPECT_TRUE(incomplete(scene, "p.rotate.y"));
   EXPECT_FALSE(incomplete(scene, "p.irradiance"));
 }
