@@ -48,6 +48,12 @@ def test_smooth_lobes_are_made_rough(tmp_path):
         assert not same(image(scene), image(limn.load(smooth, light=0.5)))
 
 
+def test_the_program_writes_the_roughness(program, folder):
+    program("render", "--smooth-as", "0.25", "--spp", "1")
+    text = (folder / "program.exr").read_bytes()
+    assert b"limn.smooth_as\0string\0\x04\0\0\0" + b"0.25" in text
+
+
 def test_text_is_as_good_as_a_file(folder, scene):
     assert same(image(limn.load_string(SCENE, folder)), image(scene))
     broken = SCENE.replace("</scene>", "<lamp/></scene>")
