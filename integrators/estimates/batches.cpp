@@ -153,9 +153,24 @@ class BatchRunner {
       }
     }
     add();
+    if (sharing_) add_cut(tile, sink);
     double booked = 0;
     for (const TermCost& cost : costs) booked += cost.seconds;
     costs[estimator_.pixel_slot()].seconds += watch.seconds() - booked;
+  }
+
+  // Samples that pixels of the tile have for themselves, where others are shared.
+  void add_cut(const Tile& tile, SampleSink& sink) {
+    for (int y = tile.y0; y < tile.y1; ++y) {
+      for (int x = tile.x0; x < tile.x1; ++x) {
+        if (is_whole(film_, x, y)) continue;
+        for (int s = batch_.first; s < batch_.last; ++s) {
+          const PixelSample at{x, y, s};
+          const KeyedSample one{at, pixel_key(estimator_, batch_, at)};
+          estimator_.add_pixels({&one, 1}, sink);
+        }
+      }
+    }
   }
 
   struct Chunk {
@@ -441,7 +456,8 @@ void run_pixel_sample(const SampleEstimator& estimator, uint64_t seed, const Pix
   SampleSink sink(film, estimator.lanes(), lane_scale, sums, costs, bad, &log);
   const Batch batch = batch_of(estimator, seed, INT_MAX, static_cast<int>(at.s));
   const KeyedSample one{at, pixel_key(estimator, batch, at)};
-  if (const SharingEstimator* sharing = sharing_of(estimator)) {
+  const SharingEstimator* sharing = sharing_of(estimator);
+  if (sharing && is_whole(film, at.x, at.y)) {
     const SharedPlace place = shared_place(*sharing, batch, at.s);
     const SharedPlace* const places[] = {&place};
     sharing->add_shared({&one, 1}, places, sink);

@@ -39,10 +39,12 @@ SharedPlace::SharedPlace(const Filter& filter, int reach, const Rng& key) {
   for (int i = 0; i < side * side; ++i) weights[i] = rows[i / side] * columns[i % side];
 }
 
-double weight_of_cut(const Filter& filter, const Film::Range& range) {
-  if (range.lower <= -filter.radius && range.upper >= filter.radius) return 1;
-  return filter.integral(filter.radius) /
-         (filter.integral(range.upper) - filter.integral(range.lower));
+bool is_whole(const Film& film, int x, int y) {
+  const double radius = film.filter.radius;
+  const auto holds = [&](const Film::Range& range) {
+    return range.lower <= -radius && range.upper >= radius;
+  };
+  return holds(film.range_x(x)) && holds(film.range_y(y));
 }
 
 }  // namespace limn

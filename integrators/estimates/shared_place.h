@@ -5,7 +5,7 @@
 // a place d in a pixel, of density S(d) = sum_m f(d + m) along each axis; given d, f(d + m) / S(d)
 // draws m. Here d alone is drawn, and all m are taken with these weights. So an image has the same
 // expectation, and less variance, as nothing is left of the choice of m. The weights add up to 1:
-// a constant has no error, but next to a border of the film that cuts filters.
+// a constant has no error. Pixels whose filters a border of the film cuts have samples of their own.
 #include <array>
 #include <span>
 
@@ -27,19 +27,20 @@ struct SharedPlace {
 
   double x, y;  // in the pixel, [0, 1]
   // Rows of 2 reach + 1: of the pixel `reach` below and to the right first, up to that above and to
-  // the left, if the film does not cut their filters.
+  // the left.
   std::array<double, size_t{kMostSide} * kMostSide> weights;
 };
 
-// The factor on such weights where the film cuts a pixel's filter to this range.
-double weight_of_cut(const Filter& filter, const Film::Range& range);
+// Whether no border of the film cuts the filter of a pixel.
+bool is_whole(const Film& film, int x, int y);
 
 // Estimators of images by such samples.
 class SharingEstimator : public SampleEstimator {
  public:
   // See SharedPlace::reach_of; 0: its samples are those of any estimator.
   virtual int reach() const = 0;
-  // As SampleEstimator::add_pixels, but sample i adds radiance to all that it serves of the film.
+  // As SampleEstimator::add_pixels, but sample i adds radiance to all that it serves of the film:
+  // pixels whose filters are whole.
   virtual void add_shared(std::span<const KeyedSample> samples,
                           std::span<const SharedPlace* const> places, SampleSink& sink) const = 0;
 };

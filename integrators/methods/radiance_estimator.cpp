@@ -158,12 +158,11 @@ void RadianceEstimator::add_footprint(const PixelSample& at, Footprint& sums,
   for (int row = -reach_; row <= reach_; ++row) {
     const int y = at.y - row;
     const bool in_rows = y >= film.crop_y && y < film.crop_y + film.crop_height;
-    const double of_row = in_rows ? weight_of_cut(film.filter, film.range_y(y)) : 0;
     for (int column = -reach_; column <= reach_; ++column, ++k) {
       const int x = at.x - column;
-      if (in_rows && x >= film.crop_x && x < film.crop_x + film.crop_width) {
-        const double weight = of_row * weight_of_cut(film.filter, film.range_x(x));
-        sink.add_radiance({x, y, at.s}, {sums[0][k], sums[1][k], sums[2][k]}, weight);
+      if (in_rows && x >= film.crop_x && x < film.crop_x + film.crop_width &&
+          is_whole(film, x, y)) {
+        sink.add_radiance({x, y, at.s}, {sums[0][k], sums[1][k], sums[2][k]}, 1);
       }
       for (auto& sum : sums) sum[k] = 0;
     }

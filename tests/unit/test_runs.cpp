@@ -352,7 +352,7 @@ TEST(SharedPlaces, HaveTheWeightsOfTheFilter) {
   }
 }
 
-// Within two pixels of the border the film cuts filters.
+// Pixels whose filters the film cuts have samples of their own.
 TEST(SharedPlaces, LeaveConstantsExact) {
   const TempFiles files;
   SceneParts parts = small_scene(files);
@@ -360,11 +360,7 @@ TEST(SharedPlaces, LeaveConstantsExact) {
   parts.body = "<emitter type=\"constant\"><rgb name=\"radiance\" value=\"0.7\"/></emitter>";
   const Moments image =
       render(make_scene(files, parts), run_settings(3), {.generator = "sobol"}).radiance;
-  for (int y = 2; y < parts.height - 2; ++y) {
-    for (int i = 6; i < 3 * (parts.width - 2); ++i) {
-      EXPECT_NEAR(image.mean(size_t{3} * y * parts.width + i), 0.7, 1e-12);
-    }
-  }
+  for (size_t i = 0; i < image.size(); ++i) EXPECT_NEAR(image.mean(i), 0.7, 1e-12);
 }
 
 TEST(Seeds, Matter) {
