@@ -54,7 +54,7 @@ class EdgeMotion {
   bool moves(const MovingPoint& point) const;
   // g: the derivative with respect to the position of an end of the edge.
   void contribute_end(Tape& tape, EdgeRef id, int end, const Vec3d& g) const;
-  // The same of both ends of a side of a light's frame.
+  // As contribute_end, for both ends of a side of a light's frame (framed_light.h).
   void contribute_frame(Seeds& seeds, const MovingPoint& point, const Vec3d& g) const;
   void contribute_crossing(Tape& tape, EdgeRef id, const Vec3d& x, const Vec3d& g) const;
   void contribute_face(Tape& tape, FaceRef face, const Vec3d& x, const Vec3d& g) const;

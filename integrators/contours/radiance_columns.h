@@ -59,7 +59,7 @@ class RadianceColumns {
     double pole_linear, across_linear;  // of theta
   };
   static Moments moments(double theta, double c, double s);
-  // Of the texels in a row and in the next: how they count in the integrals from that row on.
+  // Weights, in the integrals from a row on, of the texels of that row (here) and the next (below).
   struct InRow {
     double pole_here, pole_below, across_here, across_below;
   };

@@ -133,44 +133,44 @@ class BatchRunner {
 
   void run_tile(const Tile& tile, std::vector<TermCost>& costs, SampleSink& sink) {
     const Stopwatch watch;
-    std::vector<KeyedSample> together;
-    std::vector<const SharedPlace*> places;  // of these
-    const size_t most = estimator_.together();
-    const auto add = [&] {
-      sharing_ ? sharing_->add_shared(together, places, sink)
-               : estimator_.add_pixels(together, sink);
-      together.clear();
-      places.clear();
+    const auto is_any = [](int, int) { return true; };
+    const auto is_cut = [&](int x, int y) { return !is_whole(film_, x, y); };
+    const auto add = [&](const std::vector<KeyedSample>& together) {
+      estimator_.add_pixels(together, sink);
     };
-    for (int y = tile.y0; y < tile.y1; ++y) {
-      for (int x = tile.x0; x < tile.x1; ++x) {
-        for (int s = batch_.first; s < batch_.last; ++s) {
-          const PixelSample at{x, y, s};
-          together.push_back({at, pixel_key(estimator_, batch_, at)});
-          if (sharing_) places.push_back(&places_[s - batch_.first]);
-          if (together.size() == most) add();
-        }
-      }
+    if (sharing_) {
+      std::vector<const SharedPlace*> places;
+      in_groups(tile, is_any, [&](const std::vector<KeyedSample>& together) {
+        places.clear();
+        for (const KeyedSample& one : together) places.push_back(&places_[one.at.s - batch_.first]);
+        sharing_->add_shared(together, places, sink);
+      });
+      in_groups(tile, is_cut, add);
+    } else {
+      in_groups(tile, is_any, add);
     }
-    add();
-    if (sharing_) add_cut(tile, sink);
     double booked = 0;
     for (const TermCost& cost : costs) booked += cost.seconds;
     costs[estimator_.pixel_slot()].seconds += watch.seconds() - booked;
   }
 
-  // Samples that pixels of the tile have for themselves, where others are shared.
-  void add_cut(const Tile& tile, SampleSink& sink) {
+  // Calls add(samples) for all samples of the tile's pixels that `takes`, several at a time.
+  template <class Takes, class Add>
+  void in_groups(const Tile& tile, const Takes& takes, const Add& add) const {
+    std::vector<KeyedSample> together;
     for (int y = tile.y0; y < tile.y1; ++y) {
       for (int x = tile.x0; x < tile.x1; ++x) {
-        if (is_whole(film_, x, y)) continue;
+        if (!takes(x, y)) continue;
         for (int s = batch_.first; s < batch_.last; ++s) {
           const PixelSample at{x, y, s};
-          const KeyedSample one{at, pixel_key(estimator_, batch_, at)};
-          estimator_.add_pixels({&one, 1}, sink);
+          together.push_back({at, pixel_key(estimator_, batch_, at)});
+          if (together.size() < estimator_.together()) continue;
+          add(together);
+          together.clear();
         }
       }
     }
+    if (!together.empty()) add(together);
   }
 
   struct Chunk {

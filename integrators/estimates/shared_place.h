@@ -31,7 +31,7 @@ struct SharedPlace {
   std::array<double, size_t{kMostSide} * kMostSide> weights;
 };
 
-// Whether no border of the film cuts the filter of a pixel.
+// Whether the whole filter around pixel (x, y) lies on the film.
 bool is_whole(const Film& film, int x, int y);
 
 // Estimators of images by such samples.

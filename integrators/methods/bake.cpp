@@ -313,7 +313,7 @@ Image BakedView::texel_adjoint(const SkyMap& sky, const Image& adjoint) const {
   std::vector<double> sums(static_cast<size_t>(texels.width) * texels.height * 3);
   const auto add = [&](const Vec3d& w, const Rgb<double>& d) {
     for (const auto& [texel, weight] : map.sky->texel_weights(w)) {
-      // Of a map of one row the second is a copy.
+      // A map of one row is stored as two equal rows.
       const size_t at = 3 * texel % sums.size();
       for (int c = 0; c < 3; ++c) sums[at + c] += d[c] * weight;
     }

@@ -78,7 +78,8 @@ bool values_move(const Scene& seeded) {
   return false;
 }
 
-// Of more flat mirrors and panes than edges are looked for in: which ones count.
+// The end of a warning where a scene has more flat mirrors and panes than edges are sampled in: the
+// names of those that are. Empty where it has not.
 std::string of_flat_mirrors(const PathContext& context, const Scene& scene) {
   const FlatMirrors* const flat = context.flat_mirrors;
   if (!flat || flat->left_out() == 0) return "";

@@ -14,7 +14,7 @@ class MovingColours {
  public:
   // scene: with these parameters seeded.
   MovingColours(const Scene& scene, std::span<const Parameter> parameters);
-  // Whether the BSDF of a shape has derivatives on its front, or on its back.
+  // Whether parameters move the BSDF on that side of a shape.
   bool of(ShapeId shape, bool front) const { return sides_[shape.index()][front]; }
   bool of_sky() const { return sky_; }
 

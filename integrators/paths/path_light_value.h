@@ -7,7 +7,7 @@
 
 namespace limn {
 
-// What the light that was drawn adds but for its radiance; none if that is black.
+// Sets the factor on the drawn light's radiance; drops the sample where its f_s is zero.
 template <class S, class Visitor>
 inline void PathTracer<S, Visitor>::weigh_light(Walk& walk) const {
   if (!walk.light) return;

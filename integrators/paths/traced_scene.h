@@ -8,7 +8,7 @@
 
 namespace limn {
 
-// Whether a BSDF has a GGX lobe, which eight lanes evaluate faster (PathTracer::work_wide).
+// Whether any BSDF has a GGX lobe, which is evaluated eight at a time (PathTracer::work_wide).
 bool is_glossy(const Scene& scene);
 
 // Which light and which share of the directions paths draw, and how they end, as a scene has it

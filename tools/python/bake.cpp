@@ -29,6 +29,11 @@ struct BakeCall {
   }
 };
 
+int checked_threads(int threads) {
+  if (threads < 0) throw InputError("threads must not be below 0");
+  return thread_count(threads);
+}
+
 SkyMap to_map(nb::handle sky, double scale, double rotate) {
   return {to_image(sky), scale, rotate};
 }
@@ -67,7 +72,8 @@ void bind_bake(nb::module_& m) {
           "relight",
           [](const BakedView& view, nb::handle sky, double scale, double rotate, int threads) {
             const SkyMap map = to_map(sky, scale, rotate);
-            return to_array(without_gil([&] { return view.relight(map, thread_count(threads)); }));
+            const int count = checked_threads(threads);
+            return to_array(without_gil([&] { return view.relight(map, count); }));
           },
           nb::arg("sky"), nb::arg("scale") = 1.0, nb::arg("rotate") = 0.0, nb::arg("threads") = 0,
           nb::sig("def relight(self, sky: numpy.typing.ArrayLike, scale: float = 1.0, rotate: "

@@ -26,7 +26,7 @@ struct BsdfColour {
   }
 };
 
-// The same of a number.
+// A number of a BSDF (a roughness), constant or from a texture, as BsdfColour is for colours.
 struct BsdfNumber {
   Dual constant;
   int texture = -1;

@@ -1,5 +1,5 @@
 #pragma once
-// What makes BSDFs.
+// Functions that create BSDFs.
 #include <memory>
 #include <optional>
 

@@ -237,9 +237,9 @@ def reconstruct(
 
     minutes: what the fit may take; steps: of its four stages, in its place. size: photographs are
     made smaller, to so many pixels on the longer side. hold_out: so many of the last views are kept
-    for judging alone (default: one of eight or more). faces: of the
-    mesh (default: ten for each of the object's pixels, at most 4000 a minute). tell(progress): after each step. Ctrl-C ends
-    the fit; what it has found is written.
+    for judging alone (default: 1 if there are 8). faces: of the mesh (default: ten for each of the
+    object's pixels, at most 4000 a minute). tell(progress): after each step. Ctrl-C ends the fit;
+    what it has found is written.
 
     The sky's mean is grey, and the 98th percentile of colours is 0.8: photographs cannot tell
     bright light from a bright object. Raises limn.InputError that names the file; warns of
@@ -260,11 +260,14 @@ def reconstruct(
         raise InputError(f"steps: {len(count)} numbers for {len(_STAGES)} stages")
     model, stopped = _fitted(model, used, faces or _most_faces(used, minutes), minutes, count,
                              seed, threads, history, tell)  # fmt: skip
-    errors = {} if stopped else _errors(model, used, 60 * minutes * _ERRORS,
-                                        count[-1], seed, threads)  # fmt: skip
     write_model(out, model, views)
-    if errors:
-        _write_errors(os.path.join(out, "errors.json"), errors)
+    errors: dict[str, Any] = {}
+    if not stopped:
+        try:
+            errors = _errors(model, used, 60 * minutes * _ERRORS, count[-1], seed, threads)
+            _write_errors(os.path.join(out, "errors.json"), errors)
+        except KeyboardInterrupt:
+            warnings.warn("interrupted: errors.json is not written", stacklevel=2)
     figures = _report(out, model, used, held, history, threads, time.monotonic() - start)
     return Reconstruction(model, used, held, history, figures, errors, out)
 
@@ -332,15 +335,15 @@ def main(words: Sequence[str]) -> int:
     parser.add_argument("-o", "--output", required=True, metavar="OUT",
                         help="folder for the results (created if missing)")  # fmt: skip
     parser.add_argument("--minutes", type=float, default=15.0, metavar="M",
-                        help="time for the fit (default: 15)")  # fmt: skip
+                        help="minutes for the fit (default: 15)")  # fmt: skip
     parser.add_argument("--size", type=int, default=128, metavar="PIXELS",
-                        help="longer side to which photographs are made smaller (default: 128)")  # fmt: skip
+                        help="longer side of the reduced photographs (default: 128)")  # fmt: skip
     parser.add_argument("--hold-out", type=int, metavar="N",
-                        help="last views kept for judging (default: one of eight or more)")  # fmt: skip
+                        help="number of last views, by name, held out of the fit (default: 1 if there are 8)")  # fmt: skip
     parser.add_argument("--faces", type=int, metavar="N",
-                        help="of the mesh (default: by the photographs and the time)")  # fmt: skip
-    parser.add_argument("--seed", type=int, default=0, help="of the random numbers (default: 0)")
-    parser.add_argument("--threads", type=int, default=0, help="default: all cores")
+                        help="faces of the mesh (default: by the photographs and the time)")  # fmt: skip
+    parser.add_argument("--seed", type=int, default=0, help="seed of the random numbers (default: 0)")
+    parser.add_argument("--threads", type=int, default=0, help="number of threads (default: all cores)")
     given = parser.parse_args(words)
     warnings.showwarning = lambda message, *_: print(f"warning: {message}", file=sys.stderr)
     try:
