@@ -421,6 +421,17 @@ def test_an_interrupt_leaves_what_was_found(egg):
     assert os.path.exists(egg / "out" / "report.html")
 
 
+def test_an_interrupt_of_the_errors_leaves_the_object(egg, monkeypatch):
+    def stop(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(limn.reconstruction, "_errors", stop)
+    with pytest.warns(UserWarning, match="errors.json is not written"):
+        found = limn.reconstruct(egg, egg / "out", size=16, steps=[1, 1, 1, 1])
+    assert not found.errors and os.path.exists(egg / "out" / "object.ply")
+    assert os.path.exists(egg / "out" / "report.html")
+
+
 def test_colours_are_baked_where_texture_coordinates_are():
     places = np.array([[0.1, 0.2], [0.9, 0.2], [0.1, 0.9]])
     colours = np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1]])
