@@ -5,7 +5,7 @@
 // a place d in a pixel, of density S(d) = sum_m f(d + m) along each axis; given d, f(d + m) / S(d)
 // draws m. Here d alone is drawn, and all m are taken with these weights. So an image has the same
 // expectation, and less variance, as nothing is left of the choice of m. The weights add up to 1:
-// a constant has no error. Pixels whose filters a border of the film cuts have samples of their own.
+// a constant has no error. Pixels whose filters the film's border cuts have samples of their own.
 #include <array>
 #include <span>
 
