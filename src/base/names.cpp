@@ -1,7 +1,32 @@
 // Lists of known names in messages.
 #include "limn/core/names.h"
 
+#include <algorithm>
+#include <numeric>
+
+#include "limn/core/nearest_names.h"
+
 namespace limn {
+
+namespace {
+
+// Levenshtein's.
+size_t edit_distance(const std::string& a, const std::string& b) {
+  std::vector<size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), 0);
+  for (size_t i = 0; i < a.size(); ++i) {
+    size_t diagonal = row[0];
+    row[0] = i + 1;
+    for (size_t j = 0; j < b.size(); ++j) {
+      const size_t replaced = diagonal + (a[i] == b[j] ? 0 : 1);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({replaced, row[j] + 1, diagonal + 1});
+    }
+  }
+  return row.back();
+}
+
+}  // namespace
 
 std::string join(const std::vector<std::string>& words) {
   std::string text;
@@ -21,6 +46,15 @@ std::string unknown_name(const std::string& what, const std::string& name,
 
 std::string known_names(const std::vector<std::string>& known, const std::string& none) {
   return known.empty() ? none : "known: " + join(known);
+}
+
+std::vector<std::string> nearest_names(const std::string& name, std::vector<std::string> known,
+                                       size_t count) {
+  std::stable_sort(known.begin(), known.end(), [&](const std::string& a, const std::string& b) {
+    return edit_distance(name, a) < edit_distance(name, b);
+  });
+  known.resize(std::min(known.size(), count));
+  return known;
 }
 
 }  // namespace limn

@@ -1,7 +1,9 @@
 // Parsing of numbers and words, and reading of whole files.
 #include "src/base/text.h"
 
+#include <cerrno>
 #include <charconv>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 
@@ -52,16 +54,20 @@ std::vector<std::string_view> split(std::string_view text, std::string_view sepa
   return pieces;
 }
 
-std::optional<std::string> read_whole_file(const std::string& file) {
+std::string read_whole_file(const std::string& file) {
+  const auto fail = [&](const std::string& why) {
+    throw InputError({file}, "cannot read: " + why);
+  };
   std::error_code error;
-  if (!std::filesystem::is_regular_file(file, error)) return std::nullopt;
   const uintmax_t size = std::filesystem::file_size(file, error);
+  if (error) fail(error.message());
+  if (!std::filesystem::is_regular_file(file)) fail("it is no regular file");
   std::ifstream stream(file, std::ios::binary);
-  if (error || !stream) return std::nullopt;
+  if (!stream) fail(std::strerror(errno));
   require_memory({file}, static_cast<double>(size), "the file", "split it");
   std::string content(size, '\0');
   stream.read(content.data(), static_cast<std::streamsize>(size));
-  if (static_cast<uintmax_t>(stream.gcount()) != size) return std::nullopt;
+  if (static_cast<uintmax_t>(stream.gcount()) != size) fail("it ends early");
   return content;
 }
 

@@ -16,7 +16,7 @@ std::optional<int64_t> parse_integer(std::string_view text);
 // Splits `text` at any of `separators`; omits empty pieces.
 std::vector<std::string_view> split(std::string_view text, std::string_view separators);
 
-// The whole file; nothing if it cannot be read. InputError if it exceeds memory.
-std::optional<std::string> read_whole_file(const std::string& file);
+// The whole file. InputError that says why where it cannot be read or exceeds memory.
+std::string read_whole_file(const std::string& file);
 
 }  // namespace limn

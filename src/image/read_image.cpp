@@ -71,9 +71,7 @@ StoredImage read_stored_image(const std::string& file) {
   if (first.starts_with(kExr)) return stored(read_exr(file));
   for (const ImageFormat& format : kFormats) {
     if (!first.starts_with(format.begins)) continue;
-    const std::optional<std::string> data = read_whole_file(file);
-    if (!data) throw InputError({file}, "cannot read the file");
-    return format.read(file, *data);
+    return format.read(file, read_whole_file(file));
   }
   throw InputError({file}, "is no image that is read (known: BMP, EXR, JPEG, PNG, Radiance RGBE)");
 }
@@ -98,9 +96,7 @@ Image read_alpha(const std::string& file) {
   const std::string first = first_bytes(file);
   if (first.starts_with(kExr)) return read_exr_alpha(file);
   if (!first.starts_with(kFormats[0].begins)) return {};
-  const std::optional<std::string> data = read_whole_file(file);
-  if (!data) throw InputError({file}, "cannot read the file");
-  return read_png_alpha(file, *data);
+  return read_png_alpha(file, read_whole_file(file));
 }
 
 namespace {

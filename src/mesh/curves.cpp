@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <optional>
 
 #include "src/base/text.h"
 
@@ -166,8 +165,7 @@ Ring spline_ring(const ControlPoint* c, double t) {
 }  // namespace
 
 std::vector<Curve> parse_curves(const std::string& file, size_t least, const Matrix4& to_world) {
-  const std::optional<std::string> text = read_whole_file(file);
-  if (!text) throw InputError({file}, "cannot read the file");
+  const std::string text = read_whole_file(file);
   std::vector<Curve> curves;
   SourceLocation where{file, 0, 1};
   int begun = 0;  // the line of the curve's first point; 0: outside of curves
@@ -178,9 +176,9 @@ std::vector<Curve> parse_curves(const std::string& file, size_t least, const Mat
     }
     begun = 0;
   };
-  for (size_t at = 0; at < text->size();) {
-    const size_t end = std::min(text->find('\n', at), text->size());
-    const auto words = split(std::string_view(*text).substr(at, end - at), " \t\r");
+  for (size_t at = 0; at < text.size();) {
+    const size_t end = std::min(text.find('\n', at), text.size());
+    const auto words = split(std::string_view(text).substr(at, end - at), " \t\r");
     at = end + 1;
     ++where.line;
     if (words.empty()) {

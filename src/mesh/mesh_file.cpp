@@ -54,10 +54,9 @@ Mesh read_mesh(const std::string& file, bool face_normals) {
 
 std::vector<Vec3d> read_vertex_vectors(const std::string& file) {
   if (is_mesh_file(file)) return parse_mesh(file).positions;
-  const std::optional<std::string> text = read_whole_file(file);
-  if (!text) throw InputError({file}, "cannot read the file");
+  const std::string text = read_whole_file(file);
   std::vector<Vec3d> vectors;
-  std::string_view rest = *text;
+  std::string_view rest = text;
   for (int line = 1; !rest.empty(); ++line) {
     const size_t end = std::min(rest.find('\n'), rest.size());
     const std::string_view content = rest.substr(0, end);

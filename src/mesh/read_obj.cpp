@@ -337,9 +337,8 @@ struct Parsed {
 }  // namespace
 
 RawMesh parse_obj(const std::string& file) {
-  const std::optional<std::string> text = read_whole_file(file);
-  if (!text) throw InputError({file}, "cannot read the file");
-  ObjCheck check(file, *text);
+  const std::string text = read_whole_file(file);
+  ObjCheck check(file, text);
   Parsed parsed;
   std::istringstream lines(check.take_lines());
   if (!tinyobj::LoadObjWithCallback(lines, Parsed::callbacks(), &parsed)) {

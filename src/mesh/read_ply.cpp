@@ -485,9 +485,8 @@ void read_faces(PlyCursor& in, const PlyElement& element, uint64_t vertex_count,
 }  // namespace
 
 RawMesh parse_ply(const std::string& file) {
-  const std::optional<std::string> data = read_whole_file(file);
-  if (!data) throw InputError({file}, "cannot read the file");
-  PlyCursor in(file, *data);
+  const std::string data = read_whole_file(file);
+  PlyCursor in(file, data);
   const std::vector<PlyElement> elements = parse_header(in);
   const auto vertices = std::find_if(elements.begin(), elements.end(),
                                      [](const PlyElement& e) { return e.name == "vertex"; });

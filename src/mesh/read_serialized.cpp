@@ -24,11 +24,7 @@ constexpr uint32_t kHasNormals = 0x1, kHasUv = 0x2, kHasColours = 0x8, kFaceNorm
 // The bytes of a file, and what to blame.
 class SerializedFile {
  public:
-  explicit SerializedFile(const std::string& file) : file_(file) {
-    std::optional<std::string> data = read_whole_file(file);
-    if (!data) throw InputError({file}, "cannot read the file");
-    data_ = std::move(*data);
-  }
+  explicit SerializedFile(const std::string& file) : file_(file), data_(read_whole_file(file)) {}
   [[noreturn]] void fail(const std::string& message) const { throw InputError({file_}, message); }
   const std::string& name() const { return file_; }
 

@@ -5,11 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "limn/core/check.h"
 #include "limn/core/moved.h"
 #include "limn/core/names.h"
+#include "limn/core/nearest_names.h"
 #include "src/scene/motion.h"
 #include "src/scene/motion_lists.h"
 
@@ -17,32 +17,12 @@ namespace limn {
 
 namespace {
 
-// Levenshtein's distance: the fewest insertions, deletions and replacements of a character.
-size_t edit_distance(const std::string& a, const std::string& b) {
-  std::vector<size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), 0);
-  for (size_t i = 0; i < a.size(); ++i) {
-    size_t diagonal = row[0];
-    row[0] = i + 1;
-    for (size_t j = 0; j < b.size(); ++j) {
-      const size_t replaced = diagonal + (a[i] == b[j] ? 0 : 1);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({replaced, row[j] + 1, diagonal + 1});
-    }
-  }
-  return row.back();
-}
-
 [[noreturn]] void fail_unknown(const Scene& scene, const std::string& name,
                                const std::vector<Parameter>& list) {
   std::vector<std::string> names;
   for (const Parameter& p : list) names.push_back(p.name);
-  std::stable_sort(names.begin(), names.end(), [&](const std::string& a, const std::string& b) {
-    return edit_distance(name, a) < edit_distance(name, b);
-  });
-  names.resize(std::min<size_t>(names.size(), 5));
-  throw UnknownParameter({scene.file},
-                         "unknown parameter \"" + name + "\" (nearest: " + join(names) + ")");
+  throw UnknownParameter({scene.file}, "unknown parameter \"" + name + "\" (nearest: " +
+                                           join(nearest_names(name, names, 5)) + ")");
 }
 
 // Whether a texture in use jumps where no edge is known: then nothing may move.

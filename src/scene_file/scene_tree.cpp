@@ -189,11 +189,10 @@ class TreeLoader {
     if (!error && size > kMaxText - text_) {
       throw InputError(mentioned, "the scene's files have more than 33554432 bytes of XML");
     }
-    const std::optional<std::string> text = read_whole_file(file);
-    if (!text) throw InputError({file}, "cannot read the file");
-    text_ += std::min(text->size(), kMaxText - text_);
+    const std::string text = read_whole_file(file);
+    text_ += std::min(text.size(), kMaxText - text_);
     tree_.files.push_back(file);
-    return parse_xml(file, *text);
+    return parse_xml(file, text);
   }
 
   void check_defines(const std::string& file) {

@@ -179,10 +179,9 @@ std::vector<SpectrumSample> parse_spectrum(const std::string& text, const Source
 }
 
 std::vector<SpectrumSample> read_spectrum_file(const std::string& file) {
-  const std::optional<std::string> text = read_whole_file(file);
-  if (!text) throw InputError({file}, "cannot read the file");
+  const std::string text = read_whole_file(file);
   std::vector<SpectrumSample> samples;
-  std::string_view rest = *text;
+  std::string_view rest = text;
   for (int line = 1; !rest.empty(); ++line) {
     const size_t end = std::min(rest.find('\n'), rest.size());
     const std::string_view content = rest.substr(0, std::min(end, rest.find('#')));

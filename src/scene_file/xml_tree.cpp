@@ -137,7 +137,9 @@ XmlElement parse_xml(const std::string& file, const std::string& text) {
                        "<!DOCTYPE> is not read: entities are not substituted");
     }
     if (child.type() != pugi::node_element) {
-      throw InputError(place_of_text(child, places), "text outside of the root element");
+      throw InputError(place_of_text(child, places),
+                       root ? "text outside of the root element"
+                            : "text in front of the root element: a scene is XML");
     }
     if (root) {
       throw InputError(places.at(static_cast<size_t>(child.offset_debug()) - 1),

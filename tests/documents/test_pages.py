@@ -37,7 +37,7 @@ FOREIGN = {
 def pages():
     """(name from the root, text) of every page in the repository."""
     for folder, inner, names in os.walk(ROOT):
-        inner[:] = [n for n in inner if not n.startswith(("build", ".git")) and n != "out"]
+        inner[:] = [n for n in inner if not n.startswith(("build", ".")) and n != "out"]
         for name in names:
             if name.endswith(".md"):
                 file = os.path.join(folder, name)

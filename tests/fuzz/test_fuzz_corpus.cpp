@@ -22,9 +22,8 @@ TEST_P(FuzzCorpus, IsReadOrRefused) {
   int files = 0;
   for (const auto& entry : std::filesystem::directory_iterator(kCorpus / GetParam().name)) {
     SCOPED_TRACE(entry.path());
-    const auto content = read_whole_file(entry.path().string());
-    ASSERT_TRUE(content);
-    EXPECT_NO_THROW(GetParam().run(bytes_of(*content)));
+    const std::string content = read_whole_file(entry.path().string());
+    EXPECT_NO_THROW(GetParam().run(bytes_of(content)));
     ++files;
   }
   EXPECT_GT(files, 2);
@@ -34,7 +33,7 @@ TEST_P(FuzzCorpus, IsReadOrRefused) {
 TEST_P(FuzzCorpus, NeighboursAreReadOrRefused) {
   for (const auto& entry : std::filesystem::directory_iterator(kCorpus / GetParam().name)) {
     SCOPED_TRACE(entry.path());
-    const std::string content = *read_whole_file(entry.path().string());
+    const std::string content = read_whole_file(entry.path().string());
     const size_t step = 1 + content.size() / 25;
     for (size_t i = 0; i < content.size(); i += step) {
       EXPECT_NO_THROW(GetParam().run(bytes_of(content.substr(0, i)))) << i;

@@ -237,7 +237,7 @@ TEST(BadMesh, MissingFiles) {
       read_vertex_vectors(file);
       ADD_FAILURE() << name;
     } catch (const InputError& error) {
-      EXPECT_EQ(error.what(), file + ": error: cannot read the file");
+      EXPECT_EQ(error.what(), file + ": error: cannot read: No such file or directory");
     }
   }
 }

@@ -87,7 +87,7 @@ TEST(BadScene, MissingFile) {
     read_scene("no/such.xml", {}, nullptr);
     FAIL();
   } catch (const InputError& error) {
-    EXPECT_STREQ(error.what(), "no/such.xml: error: cannot read the file");
+    EXPECT_STREQ(error.what(), "no/such.xml: error: cannot read: No such file or directory");
   }
 }
 

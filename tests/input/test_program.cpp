@@ -652,13 +652,19 @@ TEST_F(Program, ShowsRejectionInAScene) {
                       "forest, silhouettes, li2019,"),
             std::string::npos);
   EXPECT_EQ(refused("reject no/such.ply -o " + folder),
-            "no/such.ply: error: cannot read the file\n");
+            "no/such.ply: error: cannot read: No such file or directory\n");
   EXPECT_NE(refused("reject " + scene_ + " -o /proc/no/such").find("/proc/no/such"),
             std::string::npos);
 }
 
 TEST_F(Program, MissingSceneAndHelp) {
-  EXPECT_EQ(refused("info no/such.xml"), "no/such.xml: error: cannot read the file\n");
+  EXPECT_EQ(refused("info no/such.xml"),
+            "no/such.xml: error: cannot read: No such file or directory\n");
+  EXPECT_EQ(refused("info /proc"), "/proc: error: cannot read: Is a directory\n");
+  EXPECT_EQ(
+      refused("info no.xml --ssp 4"),
+      "error: limn info: no such option: --ssp (nearest: --spp, --help, --seed; limn info --help "
+      "tells more)\n");
   EXPECT_EQ(run("--help").status, 0);
   EXPECT_EQ(run("gradient --help").status, 0);
 }

@@ -63,7 +63,7 @@ def test_text_is_as_good_as_a_file(folder, scene):
 
 
 @pytest.mark.parametrize("call, text", [
-    (lambda s, f: limn.load(f / "no.xml"), "{f}/no.xml: error: cannot read the file"),
+    (lambda s, f: limn.load(f / "no.xml"), "{f}/no.xml: error: cannot read: No such file or directory"),
     (lambda s, f: limn.load(f / "scene.xml", sise=3),
      '{f}/scene.xml: error: -D sise=3: the scene has no parameter "$sise" (known: alpha, size)'),
     (lambda s, f: limn.load(f / "scene.xml", smooth_as=2),

@@ -118,7 +118,7 @@ std::string error_of(const std::string& file) {
 
 // The bytes of a file with some replaced.
 std::string with(const std::string& name, size_t at, const std::string& bytes) {
-  return read_whole_file(corpus(name))->replace(at, bytes.size(), bytes);
+  return read_whole_file(corpus(name)).replace(at, bytes.size(), bytes);
 }
 
 // With the checksum of its header made right again.
@@ -184,7 +184,7 @@ TEST(ImageFormats, TruncatedFilesAreRefused) {
   const TempFiles files;
   for (const char* name : {"png/rgb.png", "jpeg/rgb.jpg", "jpeg/progressive.jpg", "bmp/rgb.bmp",
                            "rgbe/runs.hdr", "png/interlaced.png"}) {
-    const std::string whole = *read_whole_file(corpus(name));
+    const std::string whole = read_whole_file(corpus(name));
     for (const size_t size : {size_t{9}, whole.size() / 2, whole.size() - 14}) {
       EXPECT_NE(error_of(files.write("a", whole.substr(0, size))), "no error") << name << size;
     }

@@ -12,6 +12,7 @@
 #include "limn/core/error.h"
 #include "limn/core/field_error.h"
 #include "limn/core/names.h"
+#include "limn/core/nearest_names.h"
 #include "tools/limn/commands.h"
 #include "tools/limn/option_adder.h"
 #include "tools/limn/version.h"
@@ -48,6 +49,20 @@ void check_command(const CLI::App& app, int argc, char** argv) {
   throw limn::InputError(
       (first.empty() ? "limn: a command is needed" : "limn " + first + ": no such command") + " (" +
       limn::known_names(known) + "; limn --help tells more)");
+}
+
+// CLI11 alone would list what it does not expect, with the values of unknown options.
+void check_options(const CLI::App& command) {
+  std::vector<std::string> known;
+  for (const CLI::Option* option : command.get_options()) {
+    for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
+  }
+  for (const std::string& word : command.remaining()) {
+    if (!word.starts_with('-')) continue;
+    throw limn::InputError("limn " + command.get_name() + ": no such option: " + word +
+                           " (nearest: " + limn::join(limn::nearest_names(word, known, 3)) +
+                           "; limn " + command.get_name() + " --help tells more)");
+  }
 }
 
 // Has glibc ask for pages of 2 MB wherever it takes memory, and keep arrays of up to 32 MB that are
@@ -93,6 +108,9 @@ int run(int argc, char** argv) {
   check_command(app, argc, argv);
   try {
     app.parse(argc, argv);
+  } catch (const CLI::ExtrasError& error) {
+    for (const auto& [sub, command] : commands) check_options(*sub);
+    return app.exit(error), limn::kBadInput;
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? limn::kSuccess : limn::kBadInput;
   }

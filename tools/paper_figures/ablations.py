@@ -159,11 +159,16 @@ def _intro(records):
         f" {first['reference']['seconds']:.2g} s of `{first['reference']['method']}`.")
 
 
-def markdown(folder, again):
-    """folder(part): where results lie. again: the command. None without results."""
+def stored(folder):
+    """Of the parts that have results. folder(part): where they lie."""
     found = [(c.title, read_json(os.path.join(folder(c.ablated(False)), "compare.json")))
              for c in ABLATED]
-    records = [_Record(title, data) for title, data in found if data]
+    return [_Record(title, data) for title, data in found if data]
+
+
+def markdown(folder, again):
+    """folder(part): where results lie. again: the command. None without results."""
+    records = stored(folder)
     if not records:
         return None
     beside = _beside_mitsuba(records)

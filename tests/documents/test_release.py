@@ -1,0 +1,115 @@
+#!/usr/bin/env python3
+"""tools/release: published figures that repeated ones contradict are named, others are not; --help
+of the scripts does nothing else.
+"""
+
+import os
+import random
+import subprocess
+import sys
+import unittest
+from types import SimpleNamespace
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+TOOLS = os.path.join(ROOT, "tools")
+sys.path[:0] = [os.path.join(ROOT, "tests", "report"), TOOLS, os.path.join(TOOLS, "documentation")]
+
+from needs import need_matplotlib  # noqa: E402
+
+need_matplotlib()
+
+import repeated  # noqa: E402
+from paper_figures import ablations  # noqa: E402
+from stability_suite.families import FAMILIES  # noqa: E402
+from stability_suite.verdicts import ORDER, of_family  # noqa: E402
+
+TIMES = """
+| scene | light sets | + directions | + placement | `adaptive` | `fd` |
+|---|---|---|---|---|---|
+| alpha 0.05 | 1.1±0.05 | 0.2±0.01 | 0.12±0.005 | 0.095±0.005 (0.1) | 0.49±0.16 (0.5) |
+"""
+VERDICTS = """
+| family | knob | `adaptive` | `forest` |
+|---|---|---|---|
+| contact | gap: 0.1 … 0 | right | biased at 1e-3, 1e-4; noisy at 0.01 |
+
+Each run takes 0.137 s.
+"""
+
+
+class Figures(unittest.TestCase):
+    @staticmethod
+    def times(**found):
+        """What is named where a method's time is another one than the published."""
+        same = dict(zip(repeated.METHODS.values(), (
+            (1.1, 0.05), (0.2, 0.01), (0.12, 0.005), (0.095, 0.005), (0.49, 0.16))))
+        record = SimpleNamespace(title="rough mirror, alpha 0.05", time=(same | found).get)
+        return list(repeated.differing_times(TIMES, [record]))
+
+    def test_times(self):
+        self.assertEqual(self.times(), [])
+        self.assertEqual(self.times(adaptive=(0.12, 0.02), fd=(1.3, 0.5)), [])
+        (line,) = self.times(adaptive=(0.19, 0.01))
+        self.assertEqual(line, "alpha 0.05, adaptive: 0.095 ± 0.005 is published, 0.19 ± 0.01 "
+                               "found (p = 0.0007)")
+
+    def test_probability_is_student_s(self):
+        # Tables: t of four degrees of freedom is beyond 2.776 with 5 %, beyond 4.604 with 1 %.
+        for t, p in ((2.776, 0.05), (4.604, 0.01)):
+            ratio = 2.718281828 ** (t * 0.1)
+            self.assertAlmostEqual(repeated.probability((ratio, 0.06 * ratio), (1, 0.08)), p, 4)
+
+    @staticmethod
+    def verdicts(words, seconds=0.137):
+        family = next(f for f in FAMILIES if f.name == "contact")
+        records = [{"settings": {"seconds": seconds}, "methods": {"forest": {"verdict": word}}}
+                   for word in words]
+        return list(repeated.differing_verdicts(VERDICTS, [(family, records)]))
+
+    def test_verdicts(self):
+        same = ["right", "noisy", "biased", "biased", "right", "right"]
+        self.assertEqual(self.verdicts(same), [])
+        self.assertEqual(self.verdicts(["noisy", "late", "late", "biased", "noisy", "right"]), [])
+        self.assertEqual(self.verdicts(["biased", "fails", "right", "biased", "right", "right"]), [
+            "contact, forest at 0.1: right is published, biased found",
+            "contact, forest at 0.01: noisy is published, fails found",
+            "contact, forest at 1e-3: biased is published, right found"])
+        self.assertEqual(self.verdicts(["biased"] * 6, 1), [], "after another time")
+
+    def test_cells_are_read_as_they_are_written(self):
+        source, values = random.Random(3), [0.1, 1e-2, 1e-3, 1e-4, 1e-6, 0]
+        for _ in range(1000):
+            words = [source.choice(ORDER) for _ in values]
+            self.assertEqual(repeated.verdicts(of_family(words, values), values), words)
+
+    def test_pages_are_read(self):
+        self.assertGreater(repeated.published_seconds(), 0)
+        list(repeated.differences())
+        self.assertLessEqual(set(repeated.METHODS.values()), set(ablations.COLUMNS))
+        head = repeated.rows(repeated.read(repeated.COMPARISONS))[0]
+        self.assertEqual(head[1:], list(repeated.METHODS))
+
+
+class Help(unittest.TestCase):
+    def test_only_the_text(self):
+        scripts = ["build", "demo", "fuzz", "nasty", "packages", "test", "wheel", "python/venv",
+                   "python/check_install"]
+        for name in scripts:
+            with self.subTest(script=name):
+                done = subprocess.run([os.path.join(TOOLS, name), "--help"], capture_output=True,
+                                      text=True, cwd="/", timeout=20, check=False)
+                with open(os.path.join(TOOLS, name), encoding="utf-8") as stream:
+                    first = stream.readlines()[1]
+                self.assertEqual((done.returncode, done.stderr), (0, ""))
+                self.assertTrue(done.stdout.startswith(first[2:]), done.stdout)
+
+    def test_unknown_arguments_are_refused(self):
+        for name, argument in (("packages", "tset"), ("wheel", "--hlep")):
+            done = subprocess.run([os.path.join(TOOLS, name), argument], capture_output=True,
+                                  text=True, check=False)
+            self.assertEqual(done.returncode, 2, name)
+            self.assertIn(argument, done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
