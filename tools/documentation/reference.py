@@ -23,10 +23,32 @@ def commands():
     return re.findall(r"^  (\w+)  +\S", limn("--help").split("Subcommands:")[1], re.MULTILINE)
 
 
+def escaped(text):
+    """Plain words as Markdown; code within backquotes stays."""
+    return re.sub(r"(`[^`]*`)|([\\*_<>\[\]])", lambda m: m[1] or "\\" + m[2], text)
+
+
+def help_page(text):
+    """What --help prints, with a list in place of its columns, which narrow screens would cut."""
+    lines = []
+    for line in text.strip().splitlines():
+        if line.lower().startswith("usage:"):
+            lines += ["```text", line[7:], "```"]
+        elif entry := re.match(r"  (\S.*?)(?:  +(.*))?$", line):
+            lines.append(f"- `{entry[1].strip()}`: {escaped(entry[2] or '')}".rstrip())
+        elif line.startswith(" ") and lines[-1] == "```":  # a long usage goes on
+            lines.insert(-1, line)
+        elif line.startswith(" "):
+            lines[-1] += " " + escaped(line.strip())
+        else:
+            lines.append(f"\n**{line}**\n" if line.endswith(":") else escaped(line))
+    return "\n".join(lines) + "\n"
+
+
 def commands_page():
-    lines = ["# Commands\n", "```text", limn("--help").strip(), "```\n"]
+    lines = ["# Commands\n", help_page(limn("--help"))]
     for command in commands():
-        lines += [f"## {command}\n", "```text", limn(command, "--help").strip(), "```\n"]
+        lines += [f"## {command}\n", help_page(limn(command, "--help"))]
     return "\n".join(lines)
 
 
