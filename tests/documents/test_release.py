@@ -20,6 +20,7 @@ need_matplotlib()
 
 import repeated  # noqa: E402
 from paper_figures import ablations  # noqa: E402
+from report.python import SYSTEM_PYTHON, use_one_with_matplotlib  # noqa: E402
 from stability_suite.families import FAMILIES  # noqa: E402
 from stability_suite.verdicts import ORDER, of_family  # noqa: E402
 
@@ -88,6 +89,13 @@ class Figures(unittest.TestCase):
         self.assertLessEqual(set(repeated.METHODS.values()), set(ablations.COLUMNS))
         head = repeated.rows(repeated.read(repeated.COMPARISONS))[0]
         self.assertEqual(head[1:], list(repeated.METHODS))
+
+
+class Python(unittest.TestCase):
+    def test_scripts_that_a_script_starts_choose_theirs_anew(self):
+        os.environ["LIMN_REPORT_PYTHON"] = SYSTEM_PYTHON
+        use_one_with_matplotlib()
+        self.assertNotIn("LIMN_REPORT_PYTHON", os.environ)
 
 
 class Help(unittest.TestCase):

@@ -9,8 +9,9 @@ SYSTEM_PYTHON = "/usr/bin/python3"  # where Debian's matplotlib is, when another
 
 def use_one_with_matplotlib():
     """Starts the script anew under the system's Python where this one lacks matplotlib or numpy."""
+    started_anew = os.environ.pop("LIMN_REPORT_PYTHON", None)  # scripts that it starts ask again
     if all(importlib.util.find_spec(name) for name in ("matplotlib", "numpy")):
         return
-    if os.environ.get("LIMN_REPORT_PYTHON") is None and os.access(SYSTEM_PYTHON, os.X_OK):
+    if not started_anew and os.access(SYSTEM_PYTHON, os.X_OK):
         os.environ["LIMN_REPORT_PYTHON"] = SYSTEM_PYTHON
         os.execv(SYSTEM_PYTHON, [SYSTEM_PYTHON, os.path.abspath(sys.argv[0]), *sys.argv[1:]])
