@@ -77,6 +77,8 @@ def test_transforms_go_the_way_of_matrices():
      r"^dict\.ball\.radius: error: .*"),
     ({"ball": {"type": "sphere", "bsdf": {"type": "diffuse", "alpha": 0.1}}},
      r'^dict\.ball\.bsdf\.alpha: error: .*unknown parameter "alpha"'),
+    ({"ball": {"type": "stl", "filename": "b.stl"}},
+     r'^dict\.ball: error: unknown type "stl" .*; "mesh" reads STL, glTF, \.\.\.\)'),
     ({"ball": {"type": "globe"}}, r'^dict\.ball: error: unknown type "globe" \(known: aov, area, '),
     ({"ball": {"type": "sphere", "bsdf": {"type": "ref", "id": "wood"}}}, r"^dict\.ball\.bsdf: error"),
     ({"ball": {"type": "sphere", "center": [1, 2]}},

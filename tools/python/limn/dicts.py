@@ -134,7 +134,8 @@ class _Writer:
             return
         if kind not in _TAGS:
             known = ", ".join(sorted([*_TAGS, "mesh", "ref", "rgb"]))
-            raise InputError(f'{place}: error: unknown type "{kind}" (known: {known})')
+            hint = '; "mesh" reads STL, glTF, ...' if "filename" in what else ""
+            raise InputError(f'{place}: error: unknown type "{kind}" (known: {known}{hint})')
         tag = _TAGS[kind]
         attributes = {"type": kind}
         if tag in ("spectrum", "texture"):
