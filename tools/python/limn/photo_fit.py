@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import tempfile
 import time
@@ -13,14 +14,41 @@ from typing import Any
 import numpy as np
 
 from ._limn import LargeSteps, Scene, backward, render
-from .photo_model import Model, edges_of, face_normals, scenes_of, update
+from .photo_model import Model, edges_of, face_normals, scenes_of, sensor_pose, update
 from .photo_views import View
 
 # Weights of the priors beside the losses, whose gradients are made of one size first (see _Adam);
 # not tuned: a tenth of a step where photographs say something, all of it where they say nothing.
 _SMOOTH_COLOURS = 0.1
+_SMOOTH_ROUGHNESS = 0.1
 _SMOOTH_SKY = 0.1
 _BRIGHTEST = 0.8  # base colour that the 98th percentile is given, see level()
+_GIVEN = 0.01  # how much of its curvature a camera's given pose has; not tuned
+_POSE = [f"sensor.{kind}.{axis}" for kind in ("rotate", "translate") for axis in "xyz"]
+
+
+def posed(pose: Any, motion: Any) -> Any:
+    """A pose (4, 4) turned about its pinhole by a vector [radians], then shifted; world axes."""
+    angle = float(np.linalg.norm(motion[:3]))
+    x, y, z = np.asarray(motion[:3]) / max(angle, 1e-300)
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    turn = np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
+    moved = pose.copy()
+    moved[:3, :3] = turn @ pose[:3, :3]
+    moved[:3, 3] = pose[:3, 3] + motion[3:]
+    return moved
+
+
+def _flow(view: View, far: float, units: Any) -> Any:
+    """How the image of a plane in this distance moves by the six motions, (6, H, W, 2) [pixels]."""
+    y, x = np.mgrid[: view.mask.shape[0], : view.mask.shape[1]] + 0.5
+    local = np.stack([(x - view.center[0]) / view.focal, (y - view.center[1]) / view.focal,
+                      np.ones_like(x)], -1).reshape(-1, 3) * far  # fmt: skip
+    points = local @ view.pose[:3, :3].T + view.pose[:3, 3]
+    here, tiny = view.project(points)[0], 1e-5
+    moved = [dataclasses.replace(view, pose=posed(view.pose, tiny * a)).project(points)[0]
+             for a in np.diag(units)]  # fmt: skip
+    return ((np.stack(moved) - here) / tiny).reshape(6, *view.mask.shape, 2)
 
 
 @dataclass
@@ -38,6 +66,7 @@ class Plan:
     image_spp: int = 4  # of each of two images; an image costs a tenth of a gradient
     spp: int = 2  # of the gradient of photographs; masks have twice as many
     terms: tuple[str, ...] = ("interior", "camera")  # of photographs
+    cameras: bool = False  # are refined, where shape is
 
 
 @dataclass
@@ -106,6 +135,8 @@ class PhotoFit:
         self.steps = 0
         self.history: list[Progress] = []
         self.sums = {v.name: (0.0, 0.0) for v in self.views}
+        # Of each camera, what it was turned by [radians], and shifted over the distance.
+        self.moved: dict[str, Any] = {}
 
     def _seed(self) -> int:
         return int(self.random.integers(1 << 62))
@@ -138,7 +169,8 @@ class PhotoFit:
         found.mask += float((scale * (one - view.mask) * (two - view.mask)).sum())
         residual = scale * ((one + two) / 2 - view.mask)
         adjoint = np.repeat(2 / 3 * residual[..., None], 3, axis=2)
-        self._add(scene, adjoint, ["object.vertex_positions"], 2 * plan.spp, found, ("camera",))
+        names = ["object.vertex_positions", *(_POSE if plan.cameras else [])]
+        self._add(scene, adjoint, names, 2 * plan.spp, found, ("camera",))
 
     def _add(self, scene: Scene, adjoint: Any, names: list[str], spp: int, found: Losses,
              terms: Sequence[str]) -> None:  # fmt: skip
@@ -151,10 +183,13 @@ class PhotoFit:
     def losses(self, lit: Scene, flat: Scene, i: int, plan: Plan, names: list[str]) -> Losses:
         """Of view i, with gradients: of the mask alone unless the plan has photographs."""
         found = Losses()
+        lit, flat = lit.view(int(i)), flat.view(int(i))
+        if plan.cameras:
+            lit.sensor_to_world = flat.sensor_to_world = sensor_pose(self.views[i])
         if plan.shape:
-            self._coverage(flat.view(int(i)), i, plan, found)
+            self._coverage(flat, i, plan, found)
         if plan.photographs:
-            self._photograph(lit.view(int(i)), i, plan, names, found)
+            self._photograph(lit, i, plan, names, found)
         return found
 
     def run(self, plan: Plan, stage: str, tell: Callable[[Progress], object] | None = None) -> None:
@@ -165,8 +200,10 @@ class PhotoFit:
             mover = _Mover(self.model, plan)
             if plan.photographs:
                 self._first_exposures(lit, plan.image_spp)
-            names = ["object.vertex_color", "material.roughness", "material.specular", "sky.data"]
+            names = ["object.vertex_color", "object.vertex_roughness", "material.specular"]
+            names += ["sky.data"]
             names += ["object.vertex_positions"] if plan.shape else []
+            names += _POSE if plan.cameras else []
             start, order = time.monotonic(), np.array([], int)
             done = 0
             while True:
@@ -181,6 +218,9 @@ class PhotoFit:
                 batch, order = order[: plan.batch], order[plan.batch :]
                 all_losses = [self.losses(lit, flat, i, plan, names) for i in batch]
                 self._learn_exposures(batch, all_losses)
+                if plan.cameras:
+                    for i, own in zip(batch, all_losses):
+                        self._move_camera(i, own, plan, 10.0**-fraction)
                 mover.move(all_losses, fraction)
                 update(lit, flat, self.model)
                 done, self.steps = done + 1, self.steps + 1
@@ -190,6 +230,31 @@ class PhotoFit:
                 self.history.append(told)
                 if tell:
                     tell(told)
+
+    def _move_camera(self, i: int, found: Losses, plan: Plan, shrink: float) -> None:
+        """Half a Gauss-Newton step; curvature from the photograph (Lucas and Kanade 1981).
+
+        What is in view is taken for flat there, in the distance of the model's middle. Motions
+        that images do not tell apart, as those of the whole scene, stay near the given pose.
+        """
+        view = self.views[i]
+        far = float(view.project(self.model.positions.mean(axis=0)[None])[1][0])
+        units = np.array([1, 1, 1, far, far, far])
+        flow = _flow(view, far, units)
+        layers = [(view.mask[..., None], view.known[..., None] / view.mask.size)]
+        if plan.photographs:
+            weight = self.weights[i][..., None]
+            layers.append((view.image, weight / weight.size / 3))
+        matrix = np.zeros((6, 6))
+        for image, weight in layers:
+            slope = np.einsum("ahwk,khwc->ahwc", flow, np.stack(np.gradient(image, axis=(1, 0))))
+            matrix += 2 * np.einsum("ahwc,bhwc->ab", weight * slope, slope)
+        given = _GIVEN * np.trace(matrix) / 6
+        slopes = np.array([float(found.gradients[n]) for n in _POSE]) * units
+        moved = self.moved.setdefault(view.name, np.zeros(6))
+        step = np.linalg.solve(matrix + given * np.eye(6), slopes + given * moved)
+        self.moved[view.name] = moved - 0.5 * shrink * step
+        view.pose = posed(view.pose, -0.5 * shrink * step * units)
 
     def _first_exposures(self, lit: Scene, spp: int) -> None:
         """Before a step could explain them by the light."""
@@ -228,9 +293,11 @@ class _Mover:
         self.edges = edges
         weight = (plan.smoothing * model.diagonal / lengths.mean()) ** 2
         self.large = LargeSteps(model.positions, model.faces, weight)
-        # Colours spread to the neighbours of a vertex and theirs.
+        # Colours spread to the neighbours of a vertex and theirs, roughness three times as far:
+        # highlights are few.
         self.small = LargeSteps(model.positions, model.faces, 1.0)
-        self.adams = {n: _Adam() for n in ("colours", "sky", "roughness", "specular")}
+        self.wide = LargeSteps(model.positions, model.faces, 9.0)
+        self.adams = {n: _Adam() for n in ("colours", "roughness", "specular")}
         self.adams["positions"] = _Adam(uniform=True)
         self.adams["sky"] = _Adam(uniform=True)
         self.sky_spread = _map_spread(model.sky.shape[0], model.sky.shape[1], plan.blur)
@@ -247,12 +314,10 @@ class _Mover:
         if self.plan.photographs:
             self._move_colours(mean("object.vertex_color")[0], shrink)
             self._move_sky(mean("sky.data"), shrink)
-            model = self.model
-            for name, least in (("roughness", 0.08), ("specular", 0.0)):
-                step = self.adams[name].step(mean(f"material.{name}"))
-                value = getattr(model, name) - 0.02 * shrink * float(step)
-                setattr(model, name, min(max(value, least), 1.0))
-            level(model)
+            self._move_roughness(mean("object.vertex_roughness")[0].sum(axis=1), shrink)
+            step = float(self.adams["specular"].step(mean("material.specular")))
+            self.model.specular = min(max(self.model.specular - 0.02 * shrink * step, 0.0), 1.0)
+            level(self.model)
 
     def _move_positions(self, gradient: Any, shrink: float) -> None:
         model = self.model
@@ -273,16 +338,28 @@ class _Mover:
             return
         model.positions = model.positions + change
 
-    def _move_colours(self, gradient: Any, shrink: float) -> None:
-        model, prior = self.model, np.zeros_like(self.model.colours)
+    def _variation(self, values: Any) -> Any:
+        """The derivative of the total variation, rounded off, of (V, C) values; about 1."""
+        prior = np.zeros_like(values)
         a, b = self.edges.T
-        apart = model.colours[a] - model.colours[b]
-        pull = apart / np.sqrt(apart**2 + 0.02**2)  # total variation, rounded off
+        apart = values[a] - values[b]
+        pull = apart / np.sqrt(apart**2 + 0.02**2)
         np.add.at(prior, a, pull)
         np.add.at(prior, b, -pull)
+        return prior / 6
+
+    def _move_colours(self, gradient: Any, shrink: float) -> None:
+        model = self.model
         step = self.adams["colours"].step(self.small.solve(gradient))
-        step = step + _SMOOTH_COLOURS * prior / 6
+        step = step + _SMOOTH_COLOURS * self._variation(model.colours)
         model.colours = np.clip(model.colours - 0.03 * shrink * step, 0.005, 0.995)
+
+    def _move_roughness(self, gradient: Any, shrink: float) -> None:
+        model = self.model
+        smooth = self.wide.solve(np.repeat(gradient[:, None], 3, axis=1))[:, 0]
+        step = self.adams["roughness"].step(smooth)
+        step = step + _SMOOTH_ROUGHNESS * self._variation(model.roughness[:, None])[:, 0]
+        model.roughness = np.clip(model.roughness - 0.04 * shrink * step, 0.08, 1.0)
 
     def _move_sky(self, gradient: Any, shrink: float) -> None:
         """By the logarithm of its texels, through (I + lambda L)^-1 as vertices are moved."""

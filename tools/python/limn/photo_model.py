@@ -18,7 +18,7 @@ SKY = (16, 32)  # rows and columns of the sky's map
 
 @dataclass
 class Model:
-    """A mesh with a colour per vertex, one gloss for all of it, and the sky.
+    """A mesh with a colour and a roughness per vertex, and the sky.
 
     sky: radiance, (H, W, 3), as an envmap's texels. exposures: of the views, by their names: what
     the scene's radiance is multiplied by to be the photograph's.
@@ -27,10 +27,13 @@ class Model:
     positions: Any  # (V, 3), scene units
     faces: Any  # (F, 3)
     colours: Any  # (V, 3), linear base colours
-    roughness: float = 0.5
+    roughness: Any = 0.5  # (V,), or one number at first
     specular: float = 0.5
     sky: Any = field(default_factory=lambda: np.ones((*SKY, 3)))
     exposures: dict[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.roughness = np.broadcast_to(np.asarray(self.roughness, float), len(self.positions))
 
     @property
     def diagonal(self) -> float:
@@ -38,12 +41,17 @@ class Model:
         return float(np.linalg.norm(np.ptp(self.positions, axis=0)))
 
     def remeshed(self, faces: int) -> Model:
-        """The same with about so many faces of one size; colours from the nearest vertices."""
+        """The same with about so many faces of one size; materials from the nearest vertices."""
         length = math.sqrt(4 / math.sqrt(3) * surface_area(self.positions, self.faces) / faces)
         positions, corners = remesh(self.positions, self.faces, length)
-        colours = spread(self.positions, self.colours, positions)
-        return Model(positions.astype(float), corners.astype(np.int64), colours, self.roughness,
-                     self.specular, self.sky, dict(self.exposures))  # fmt: skip
+        return self.on(positions.astype(float), corners.astype(np.int64))
+
+    def on(self, positions: Any, faces: Any) -> Model:
+        """On another mesh, with the materials of the nearest vertices."""
+        values = np.concatenate([self.colours, self.roughness[:, None]], axis=1)
+        values = spread(self.positions, values, positions)
+        return Model(positions, faces, values[:, :3], values[:, 3], self.specular, self.sky.copy(),
+                     dict(self.exposures))  # fmt: skip
 
 
 def face_normals(positions: Any, faces: Any) -> Any:
@@ -83,14 +91,15 @@ def spread(places: Any, values: Any, points: Any, count: int = 4) -> Any:
     return np.concatenate(found)
 
 
-def write_coloured_ply(file: str, positions: Any, faces: Any, colours: Any) -> None:
-    """A binary PLY with linear float colours, which limn and Mitsuba read as vertex_color."""
-    fields = [(name, "<f4") for name in ("x", "y", "z", "r", "g", "b")]
-    vertices = np.empty(len(positions), dtype=fields)
-    for k, (name, _) in enumerate(fields):
-        vertices[name] = (positions if k < 3 else colours)[:, k % 3]
-    rows = np.empty(len(faces), dtype=[("count", "u1"), ("corners", "<i4", 3)])
-    rows["count"], rows["corners"] = 3, faces
+def write_coloured_ply(file: str, model: Model) -> None:
+    """A binary PLY; limn and Mitsuba read vertex_color (linear) and vertex_roughness."""
+    fields = [(name, "<f4") for name in ("x", "y", "z", "r", "g", "b", "roughness_x")]
+    vertices = np.empty(len(model.positions), dtype=fields)
+    columns = [*model.positions.T, *model.colours.T, model.roughness]
+    for (name, _), values in zip(fields, columns):
+        vertices[name] = values
+    rows = np.empty(len(model.faces), dtype=[("count", "u1"), ("corners", "<i4", 3)])
+    rows["count"], rows["corners"] = 3, model.faces
     head = "".join(f"property float {name}\n" for name, _ in fields)
     with open(file, "wb") as stream:
         stream.write(
@@ -105,12 +114,14 @@ def _words(numbers: Any) -> str:
     return " ".join(repr(float(x)) for x in np.ravel(numbers))
 
 
+def sensor_pose(view: View) -> Any:
+    """As scene files have it, (4, 4): Mitsuba's camera has +X to the left and +Y up."""
+    return view.pose * [-1, -1, 1, 1]
+
+
 def sensor_xml(view: View, number: int) -> str:
     """A view as a sensor of a scene file."""
     width, height = view.size
-    # Mitsuba's camera has +X to the left and +Y up.
-    pose = view.pose.copy()
-    pose[:3, :2] *= -1
     angle = math.degrees(2 * math.atan(0.5 * width / view.focal))
     offset = (0.5 - view.center[0] / width, 0.5 - view.center[1] / height)
     return f"""  <sensor type="perspective" id="view_{number}">
@@ -118,7 +129,7 @@ def sensor_xml(view: View, number: int) -> str:
     <float name="principal_point_offset_x" value="{offset[0]!r}"/>
     <float name="principal_point_offset_y" value="{offset[1]!r}"/>
     <float name="near_clip" value="{_near(view)!r}"/><float name="far_clip" value="1e8"/>
-    <transform name="to_world"><matrix value="{_words(pose)}"/></transform>
+    <transform name="to_world"><matrix value="{_words(sensor_pose(view))}"/></transform>
     <film type="hdrfilm">
       <integer name="width" value="{width}"/><integer name="height" value="{height}"/>
       <rfilter type="box"/>
@@ -133,27 +144,27 @@ def _near(view: View) -> float:
     return 1e-4 * max(1e-3, float(np.linalg.norm(view.pose[:3, 3])))
 
 
-def scene_xml(model: Model, views: Sequence[View], colour: str, mesh: str, sky: str) -> str:
-    """The scene file; colour: what the material's base_color is; mesh: the shape's properties."""
+def scene_xml(model: Model, views: Sequence[View], material: str, mesh: str) -> str:
+    """The scene file; material: textures of base_color and roughness; mesh: the shape."""
     sensors = "".join(sensor_xml(v, i) for i, v in enumerate(views))
     return f"""<scene version="3.0.0">
   <integrator type="path">
     <integer name="max_depth" value="3"/><boolean name="hide_emitters" value="true"/>
   </integrator>
 {sensors}  <bsdf type="principled" id="material">
-    {colour}
-    <float name="roughness" value="{model.roughness!r}"/>
+    {material}
     <float name="specular" value="{model.specular!r}"/>
   </bsdf>
   {mesh}
-  <emitter type="envmap" id="sky"><string name="filename" value="{sky}"/></emitter>
+  <emitter type="envmap" id="sky"><string name="filename" value="sky.exr"/></emitter>
 </scene>
 """
 
 
-VERTEX_COLOUR = (
-    '<texture type="mesh_attribute" name="base_color">'
-    '<string name="name" value="vertex_color"/></texture>'
+VERTEX_MATERIAL = "".join(
+    f'<texture type="mesh_attribute" name="{name}"><string name="name" value="vertex_{of}"/>'
+    "</texture>"
+    for name, of in (("base_color", "color"), ("roughness", "roughness"))
 )
 
 
@@ -166,13 +177,9 @@ def ply_shape(file: str, inside: str = '<ref id="material"/>') -> str:
 
 def scenes_of(model: Model, views: Sequence[View], folder: str) -> tuple[Scene, Scene]:
     """(the object under its sky, its coverage as light), a sensor for each view; writes files."""
-    write_coloured_ply(
-        os.path.join(folder, "object.ply"), model.positions, model.faces, model.colours
-    )
+    write_coloured_ply(os.path.join(folder, "object.ply"), model)
     write_exr(os.path.join(folder, "sky.exr"), model.sky)
-    lit = load_string(
-        scene_xml(model, views, VERTEX_COLOUR, ply_shape("object.ply"), "sky.exr"), folder
-    )
+    lit = load_string(scene_xml(model, views, VERTEX_MATERIAL, ply_shape("object.ply")), folder)
     sensors = "".join(sensor_xml(v, i) for i, v in enumerate(views))
     glow = (
         '<bsdf type="diffuse"><rgb name="reflectance" value="0"/></bsdf>'
@@ -190,6 +197,6 @@ def update(lit: Scene, flat: Scene, model: Model) -> None:
     for scene in (lit, flat):
         scene["object.vertex_positions"] = model.positions
     lit["object.vertex_color"] = model.colours[None]
-    lit["material.roughness"] = model.roughness
+    lit["object.vertex_roughness"] = np.repeat(model.roughness[None, :, None], 3, axis=2)
     lit["material.specular"] = model.specular
     lit["sky.data"] = model.sky

@@ -7,6 +7,7 @@ import html
 import json
 import math
 import os
+import struct
 import tempfile
 import warnings
 from collections.abc import Sequence
@@ -16,7 +17,7 @@ import numpy as np
 
 from ._limn import load, render, write_exr, write_png
 from .photo_model import (
-    VERTEX_COLOUR,
+    VERTEX_MATERIAL,
     Model,
     ply_shape,
     scene_xml,
@@ -33,6 +34,12 @@ def to_srgb(linear: Any) -> Any:
     """sRGB's transfer function of [0, 1]."""
     x = np.clip(linear, 0, 1)
     return np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)
+
+
+def from_srgb(encoded: Any) -> Any:
+    """The inverse of to_srgb()."""
+    x = np.clip(encoded, 0, 1)
+    return np.where(x <= 0.04045, x / 12.92, ((x + 0.055) / 1.055) ** 2.4)
 
 
 def psnr(image: Any, truth: Any, weight: Any) -> float:
@@ -109,8 +116,39 @@ def write_mtl(file: str, model: Model) -> None:
         stream.write(
             "newmtl object\nKd 1 1 1\nmap_Kd albedo.png\n"
             f"Ks {model.specular * 0.08:.4f} {model.specular * 0.08:.4f} "
-            f"{model.specular * 0.08:.4f}\nPr {model.roughness:.4f}\n"
+            f"{model.specular * 0.08:.4f}\nPr 1\nmap_Pr roughness.png\n"
         )
+
+
+def write_glb(file: str, model: Model) -> None:
+    """Binary glTF 2.0: positions, normals, linear colours; of the roughness, the mean."""
+    arrays = [model.positions, vertex_normals(model.positions, model.faces), model.colours]
+    parts = [np.asarray(a, "<f4").tobytes() for a in arrays]
+    parts.append(np.asarray(model.faces, "<u4").tobytes())
+    starts = np.cumsum([0, *map(len, parts)])
+    buffers = [{"buffer": 0, "byteOffset": int(s), "byteLength": len(p)}
+               for s, p in zip(starts, parts)]  # fmt: skip
+    vertex = {"componentType": 5126, "count": len(model.positions), "type": "VEC3"}
+    accessors: list[dict[str, Any]] = [{"bufferView": k, **vertex} for k in range(3)]
+    accessors[0]["min"], accessors[0]["max"] = (
+        np.asarray(f(model.positions, axis=0), "<f4").tolist() for f in (np.min, np.max))
+    accessors.append({"bufferView": 3, "componentType": 5125, "count": model.faces.size,
+                      "type": "SCALAR"})  # fmt: skip
+    primitive = {"attributes": {"POSITION": 0, "NORMAL": 1, "COLOR_0": 2}, "indices": 3,
+                 "material": 0}  # fmt: skip
+    rough = {"metallicFactor": 0, "roughnessFactor": float(model.roughness.mean())}
+    head = json.dumps({
+        "asset": {"version": "2.0", "generator": "limn"}, "scene": 0, "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0, "name": "object"}], "meshes": [{"primitives": [primitive]}],
+        "materials": [{"pbrMetallicRoughness": rough}], "accessors": accessors,
+        "bufferViews": buffers, "buffers": [{"byteLength": int(starts[-1])}],
+    }).encode()  # fmt: skip
+    head += b" " * (-len(head) % 4)
+    body = b"".join(parts)
+    with open(file, "wb") as stream:
+        stream.write(struct.pack("<4sII", b"glTF", 2, 28 + len(head) + len(body)))
+        for kind, chunk in ((b"JSON", head), (b"BIN\0", body)):
+            stream.write(struct.pack("<I4s", len(chunk), kind) + chunk)
 
 
 def write_cameras(file: str, views: Sequence[View], model: Model) -> None:
@@ -130,29 +168,34 @@ def write_cameras(file: str, views: Sequence[View], model: Model) -> None:
 
 
 def write_model(folder: str, model: Model, views: Sequence[View]) -> list[str]:
-    """All files but report and errors; their names. With xatlas there is an albedo map."""
+    """All files but report and errors; their names. With xatlas there are maps."""
     def inside(name: str) -> str:
         return os.path.join(folder, name)
 
     atlas = unwrapped(model.positions, model.faces)
-    names = ["object.obj", "object.ply", "sky.exr", "cameras.json", "scene.xml"]
-    write_coloured_ply(inside("object.ply"), model.positions, model.faces, model.colours)
+    names = ["object.obj", "object.ply", "object.glb", "sky.exr", "cameras.json", "scene.xml"]
+    write_coloured_ply(inside("object.ply"), model)
+    write_glb(inside("object.glb"), model)
     write_exr(inside("sky.exr"), model.sky)
     write_cameras(inside("cameras.json"), views, model)
     write_obj(inside("object.obj"), model, atlas)
-    colour, shape = VERTEX_COLOUR, ply_shape("object.ply")
+    material, shape = VERTEX_MATERIAL, ply_shape("object.ply")
     if atlas is not None:
         vertices, faces, places = atlas
         write_png(inside("albedo.png"), baked(places, faces, model.colours[vertices], _TEXELS))
+        grey = np.repeat(model.roughness[vertices, None], 3, axis=1)
+        write_png(inside("roughness.png"), from_srgb(baked(places, faces, grey, _TEXELS)))
         write_mtl(inside("object.mtl"), model)
-        colour = (
-            '<texture type="bitmap" name="base_color">'
-            '<string name="filename" value="albedo.png"/></texture>'
-        )
+        material = "".join(
+            f'<texture type="bitmap" name="{name}"><string name="filename" value="{png}.png"/>'
+            f'<boolean name="raw" value="{raw}"/></texture>'
+            for name, png, raw in (("base_color", "albedo", "false"),
+                                   ("roughness", "roughness", "true"))
+        )  # fmt: skip
         shape = shape.replace('type="ply"', 'type="obj"').replace("object.ply", "object.obj")
-        names += ["albedo.png", "object.mtl"]
+        names += ["albedo.png", "roughness.png", "object.mtl"]
     with open(inside("scene.xml"), "w", encoding="utf-8") as stream:
-        stream.write(scene_xml(model, views, colour, shape, "sky.exr"))
+        stream.write(scene_xml(model, views, material, shape))
     return names
 
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import copy
-import dataclasses
 import json
 import os
 import sys
@@ -22,7 +20,7 @@ from .errors import InputError
 from .photo_cameras import read_cameras
 from .photo_fit import PhotoFit, Plan, Progress
 from .photo_hull import checked, visual_hull
-from .photo_model import Model, ply_shape, scenes_of, spread, vertex_normals, write_coloured_ply
+from .photo_model import Model, ply_shape, scenes_of, vertex_normals, write_coloured_ply
 from .photo_output import psnr, rendered, write_model, write_report
 from .photo_views import View, bilinear, read_views
 
@@ -107,8 +105,7 @@ def _offsets(model: Model, other: Model) -> Any:
     far = 0.05 * model.diagonal
     with tempfile.TemporaryDirectory(prefix="limn_") as folder, warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
-        write_coloured_ply(os.path.join(folder, "object.ply"), other.positions, other.faces,
-                           other.colours)  # fmt: skip
+        write_coloured_ply(os.path.join(folder, "object.ply"), other)
         scene = load_string('<scene version="3.0.0"><sensor type="perspective"/>'
                             f'{ply_shape("object.ply", "")}</scene>', folder)  # fmt: skip
     normals = vertex_normals(model.positions, model.faces)
@@ -125,9 +122,7 @@ def _refitted(model: Model, views: list[View], seconds: float, steps: int | None
               threads: int) -> Model:  # fmt: skip
     """What these views tell: their own hull and steps; light and gloss begin as the model's."""
     positions, faces = visual_hull(views, _cells(views))
-    colours = spread(model.positions, model.colours, positions)
-    found = dataclasses.replace(copy.deepcopy(model), positions=positions, faces=faces,
-                                colours=colours).remeshed(len(model.faces) // 3)  # fmt: skip
+    found = model.on(positions, faces).remeshed(len(model.faces) // 3)
     for share, stage in ((0.4, _STAGES[0]), (0.6, _STAGES[2])):
         fit = PhotoFit(found, views, seed, threads)
         fit.run(Plan(share * seconds, None if steps is None else steps // 2, **stage[3]), "errors")
@@ -145,25 +140,26 @@ def _errors(model: Model, views: Sequence[View], seconds: float, steps: int | No
     mesh = LargeSteps(model.positions, model.faces, 0.5)
     position: Any = 0.0
     colour: Any = 0.0
-    roughness = 0.0
+    roughness: Any = 0.0
     for k in range(2):
         kept = [v for i, v in enumerate(views) if i % 4 != 2 * k]
         other = _refitted(model, kept, seconds, steps, seed + k + 1, threads)
         scale = len(kept) / (len(views) - len(kept)) / 2
         position = position + scale * _offsets(model, other) ** 2
-        shown = spread(other.positions, other.colours, model.positions)
-        colour = colour + scale * (shown - model.colours) ** 2
-        roughness += scale * (other.roughness - model.roughness) ** 2
-    position = mesh.solve(np.repeat(position[:, None], 3, 1))[:, 0]
-    return {"position": np.sqrt(np.maximum(position, 0)),
+        shown = other.on(model.positions, model.faces)
+        colour = colour + scale * (shown.colours - model.colours) ** 2
+        roughness = roughness + scale * (shown.roughness - model.roughness) ** 2
+    both = mesh.solve(np.stack([position, roughness, roughness], 1))
+    return {"position": np.sqrt(np.maximum(both[:, 0], 0)),
             "colour": np.sqrt(np.maximum(mesh.solve(colour), 0)),
-            "roughness": roughness**0.5}  # fmt: skip
+            "roughness": np.sqrt(np.maximum(both[:, 1], 0))}  # fmt: skip
 
 
 def _write_errors(file: str, errors: dict[str, Any]) -> None:
     told = {
         "about": "standard errors per vertex of object.ply: position along the normal [scene "
-        "units], colour [linear]; from two fits, each without another quarter of the views",
+        "units], colour [linear], roughness; from two fits, each without another quarter of the "
+        "views",
         **{k: np.round(v, 7).tolist() if isinstance(v, np.ndarray) else v
            for k, v in errors.items()},
     }  # fmt: skip
@@ -195,18 +191,20 @@ def _most_faces(views: Sequence[View], minutes: float) -> int:
     return int(np.clip(10 * np.mean(areas), 800, min(20000, max(800, 4000 * minutes))))
 
 
-def _fitted(model: Model, used: list[View], most: int, minutes: float,
+def _fitted(model: Model, used: list[View], most: int, minutes: float, cameras: bool,
             steps: Sequence[int | None], seed: int, threads: int, history: list[Progress], tell: Any) -> tuple[Model, bool]:  # fmt: skip
-    """The model after all stages, and whether Ctrl-C ended them."""
+    """The model after all stages, and whether Ctrl-C ended them; may move the views' cameras."""
+    moved: dict[str, Any] = {}
     for (stage, share, faces, how), count in zip(_STAGES, steps):
         model = model.remeshed(int(most * faces))
         if stage == "light":
             model.colours = first_colours(model, used)
             first_light(model)
         fit = PhotoFit(model, used, seed, threads)
-        fit.history, fit.steps = history, len(history)
+        fit.history, fit.steps, fit.moved = history, len(history), moved
+        refine = cameras and how.get("shape", True)
         try:
-            fit.run(Plan(60 * minutes * share, count, **how), stage, tell)
+            fit.run(Plan(60 * minutes * share, count, cameras=refine, **how), stage, tell)
         except KeyboardInterrupt:
             return fit.model, True
         model = fit.model
@@ -221,6 +219,7 @@ def reconstruct(
     size: int = 128,
     hold_out: int | None = None,
     faces: int | None = None,
+    refine_cameras: bool = False,
     steps: Sequence[int] | None = None,
     seed: int = 0,
     threads: int = 0,
@@ -238,8 +237,8 @@ def reconstruct(
     minutes: what the fit may take; steps: of its four stages, in its place. size: photographs are
     made smaller, to so many pixels on the longer side. hold_out: so many of the last views are kept
     for judging alone (default: 1 if there are 8). faces: of the mesh (default: ten for each of the
-    object's pixels, at most 4000 a minute). tell(progress): after each step. Ctrl-C ends the fit;
-    what it has found is written.
+    object's pixels, at most 4000 a minute). refine_cameras: poses are fitted, too.
+    tell(progress): after each step. Ctrl-C ends the fit; what it has found is written.
 
     The sky's mean is grey, and the 98th percentile of colours is 0.8: photographs cannot tell
     bright light from a bright object. Raises limn.InputError that names the file; warns of
@@ -258,8 +257,8 @@ def reconstruct(
     count = [None] * len(_STAGES) if steps is None else list(steps)
     if len(count) != len(_STAGES):
         raise InputError(f"steps: {len(count)} numbers for {len(_STAGES)} stages")
-    model, stopped = _fitted(model, used, faces or _most_faces(used, minutes), minutes, count,
-                             seed, threads, history, tell)  # fmt: skip
+    model, stopped = _fitted(model, used, faces or _most_faces(used, minutes), minutes,
+                             refine_cameras, count, seed, threads, history, tell)  # fmt: skip
     write_model(out, model, views)
     errors: dict[str, Any] = {}
     if not stopped:
@@ -291,7 +290,7 @@ def _report(out: str, model: Model, used: list[View], held: list[View], history:
              for v, p in zip(shown, pictures)}  # fmt: skip
     figures = {
         "PSNR, fitted views [dB]": round(float(np.mean([views[v.name]["psnr"] for v in used])), 2),
-        "roughness": round(model.roughness, 3),
+        "roughness (mean)": round(float(model.roughness.mean()), 3),
         "specular": round(model.specular, 3),
         "faces": len(model.faces),
         "steps": len(history),
@@ -342,6 +341,7 @@ def main(words: Sequence[str]) -> int:
                         help="number of last views, by name, held out of the fit (default: 1 if there are 8)")  # fmt: skip
     parser.add_argument("--faces", type=int, metavar="N",
                         help="faces of the mesh (default: by the photographs and the time)")  # fmt: skip
+    parser.add_argument("--refine-cameras", action="store_true", help="fit the cameras' poses, too")
     parser.add_argument("--seed", type=int, default=0, help="seed of the random numbers (default: 0)")
     parser.add_argument("--threads", type=int, default=0, help="number of threads (default: all cores)")
     given = parser.parse_args(words)
@@ -349,6 +349,7 @@ def main(words: Sequence[str]) -> int:
     try:
         found = reconstruct(given.folder, given.output, given.minutes, size=given.size,
                             hold_out=given.hold_out, faces=given.faces, seed=given.seed,
+                            refine_cameras=given.refine_cameras,
                             threads=given.threads, tell=_teller(given.minutes))  # fmt: skip
     except (InputError, OSError) as error:
         print(error, file=sys.stderr)
