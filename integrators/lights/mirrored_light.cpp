@@ -280,6 +280,7 @@ bool MirroredLight::sees(const Image& image, const Vec3d& p, Glare& glare) const
   }
   glare.bsdf = image.bsdf;
   glare.normal = n;
+  glare.depth = height + kFlat * image.radius;
   glare.half_angle = 2 * lobe + size;
   // Where the light is wider than the lobe, its image is about as wide as the light.
   glare.cone = lobe < 2 * size ? versine(std::max(spread, kLeastCone)) : 0;

@@ -34,6 +34,7 @@ class MirroredLight {
     Vec3d normal;       // unit, of its lit side
     Vec3d light;        // unit, from where a perfect mirror would show it towards the light
     Vec3d toward;       // unit, from the point to there
+    double depth;       // that what lies behind the surface's plane has from the point, along it
     double nearness;    // how far a far light's glare would be seen from, over the distance there
     double half_angle;  // of the cap of directions that holds most of it [rad]
     double cone;        // 1 - the cosine of the angle of directions that are uniform; 0: others are

@@ -110,19 +110,24 @@ void GlareEdges::add_pieces(const EdgeQuery& query, const MirroredLight::Glare& 
   const auto direction_at = [&](const EdgePiece& of, double u) {
     return direction(query, {of.edge, of.place(u).t, 1, 1});
   };
+  // From behind the plane no edge bounds what is seen in it.
+  const auto is_behind = [&](const EdgePiece& of) {
+    return -dot(position(of.edge, of.place(0.5).t) - query.p, glare.normal) > glare.depth;
+  };
   const DirectionCap& cap = view.caps[view.count];
   const double even = kEven / (2 * kPi * cap.sine * cap.sine / (1 + cap.cosine));
   const auto add = [&](const EdgePiece& part) {
     double bright = even;
     // At the ends: beside the brightest point it is brightest there.
     for (const double u : {0.0, 1.0}) {
+      if (is_behind(part)) break;
       bright += 0.5 * MirroredLight::pdf(glare, direction_at(part, u));
     }
     const double before = view.pieces.empty() ? 0 : view.pieces.back().sum;
     view.pieces.push_back({static_cast<uint32_t>(view.count), part,
                            before + part.weight * (bright * glare.irradiance + elsewhere)});
   };
-  for (int i = 0; i < kHalvings; ++i) {
+  for (int i = 0; i < kHalvings && !is_behind(piece); ++i) {
     if (length(direction_at(piece, 1) - direction_at(piece, 0)) <= narrow) break;
     const auto brightness = [&](double u) {
       return MirroredLight::alignment(glare, direction_at(piece, u));
@@ -135,11 +140,14 @@ void GlareEdges::add_pieces(const EdgeQuery& query, const MirroredLight::Glare& 
   add(piece);
 }
 
+Vec3d GlareEdges::position(EdgeRef edge, double t) const {
+  const EdgeMesh& mesh = edges_.object(edge.object);
+  const auto& ends = mesh.edge(edge.edge).vertices;
+  return mesh.position(ends[0]) * (1 - t) + mesh.position(ends[1]) * t;
+}
+
 Vec3d GlareEdges::direction(const EdgeQuery& query, const EdgeSample& sample) const {
-  const EdgeMesh& mesh = edges_.object(sample.edge.object);
-  const auto& ends = mesh.edge(sample.edge.edge).vertices;
-  return normalize(mesh.position(ends[0]) * (1 - sample.t) + mesh.position(ends[1]) * sample.t -
-                   query.p);
+  return normalize(position(sample.edge, sample.t) - query.p);
 }
 
 std::optional<uint32_t> GlareEdges::cap_of(const View& view, const Vec3d& omega) {

@@ -41,6 +41,7 @@ class GlareEdges {
                   EdgePiece piece, double narrow, View& view) const;
   // Whether the edge is between two faces that the point sees, one of which may show glare.
   bool is_of_gloss(EdgeRef edge, const Vec3d& p) const;
+  Vec3d position(EdgeRef edge, double t) const;
   Vec3d direction(const EdgeQuery& query, const EdgeSample& sample) const;
   // The first cap that holds a direction.
   static std::optional<uint32_t> cap_of(const View& view, const Vec3d& omega);

@@ -112,6 +112,9 @@ FAULTS = [
     Fault("specular", "mixture's density", "integrators/lights/mirrored_light.cpp",
           "mixture.share * sum + (1 - mixture.share) * scattered",
           "mixture.share * sum + scattered", "test_regions", "MirroredLight.*"),
+    Fault("specular", "edges behind the plane drawn as before it", TERMS + "glare_edges.cpp",
+          "glare.normal) > glare.depth;", "glare.normal) > 1e9;",
+          "test_regions", "MirroredLight.*"),
 
     Fault("MIS", "density of an area light x 1.5", "src/light/area.cpp",
           "return view.distance * view.distance * inverse_area_ * probability / cosine;",
@@ -208,6 +211,8 @@ FAULTS = [
     Fault("merge", "last shard's cost lost", "integrators/estimates/batch_record.cpp",
           "  largest.square = number();\n", "  largest.squares = number();\n",
           "test_program", "Parts.*"),
+    Fault("readers", "light lost in hollows", "src/mesh/lost_light.cpp",
+          "if (lift.gain[k] < 0) lifting", "lifting", "test_bad_meshes", "MendedMesh.*"),
     Fault("readers", "negative OBJ indices off by one", "src/mesh/read_obj.cpp",
           "static_cast<int64_t>(count) + index);", "static_cast<int64_t>(count) + index - 1);",
           "test_mesh"),

@@ -411,6 +411,52 @@ TEST(MirroredLight, EdgesAreDrawnWhereTheyAreLeftOut) {
   EXPECT_LT(std::fabs(drawn.mean() - left_out.mean()), 4.5 * error);
 }
 
+// A floor beside a corner of a glossy box sees grazing glare in one of its sides, and behind the
+// plane of that, outside of it, an edge of another one. Of points that are drawn, more are on the
+// edges of the lit side than on it, although it sweeps ten times the angle.
+TEST(MirroredLight, EdgesBehindTheGlossAreNotBeforeIt) {
+  const TempFiles files;
+  SceneParts parts;
+  Mesh box = cube_mesh();
+  for (Vec3f& p : box.positions) p = {0.6f * p.x, 0.2f + 0.1f * p.y, 0.42f * p.z};
+  parts.body = square("floor", 3, -90, {0, 0, 0}, diffuse("paint", "0.7, 0.7, 0.7")) +
+               obj_shape("box", write_mesh(files, "box.obj", make_mesh(box.positions, box.faces)),
+                         true, 1, {0, 0, 0}, conductor("gloss", 0.16)) +
+               R"(<emitter type="point"><point name="position" value="0.714, 3.036, 0.109"/>
+                  <rgb name="intensity" value="16, 16, 16"/></emitter>)";
+  Scene scene = make_scene(files, parts);
+  find_parameter(scene, "box.translate.z").seed(scene, 0);
+  const auto tracer = make_embree_tracer(scene, 1);
+  const Lights lights(scene);
+  const PathContext context{scene, *tracer, lights};
+  TermInput input(context, 1, {1, 1, 1, 1}, edge_sampler_type("forest"), 1);
+  const auto mirrored = MirroredLight::make(scene, lights);
+  ASSERT_TRUE(mirrored);
+  const GlareEdges glare(scene, input.edges(), input.edge_sampler(), *mirrored);
+  Rng rng(13, 0, 0);
+  const Vec3<Dual> origin{0.607679, 1.0, 0.44904}, down{0.0, -1.0, 0.0};
+  Hit hit;
+  ASSERT_TRUE(tracer->closest({value(origin), value(down)}, hit));
+  const auto surface = surface_on_ray<Dual>(scene, hit.face, origin, down);
+  const Scattering<Dual> scattering(surface, -down, scene.shading);
+  const PathVertex vertex = plain_vertex(surface, scattering, scene.shading, 0, {}, rng);
+  const EdgeQuery query = query_at(vertex);
+  GlareEdges::View view;
+  glare.list(vertex, query, view);
+  std::vector<DirectPoint> points;
+  TermCost cost;
+  glare.draw(view, query, rng, 1000, cost, points);
+  size_t in_plane = 0;
+  for (const auto& [region, sample] : points) {
+    const EdgeMesh& mesh = input.edges().object(sample.edge.object);
+    const auto& ends = mesh.edge(sample.edge.edge).vertices;
+    if (mesh.position(ends[0]).x > 0.5 && mesh.position(ends[1]).x > 0.5) ++in_plane;
+  }
+  fmt::print("{} of {} points\n", in_plane, points.size());
+  EXPECT_GT(points.size(), 500u);
+  EXPECT_GT(2 * in_plane, points.size());
+}
+
 // What a point of a wall makes of the glare on the floor before it, of these delta lights.
 struct WallPoint {
   WallPoint(const TempFiles& files, const std::string& emitters, double gloss = 0.05)

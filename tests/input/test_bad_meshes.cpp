@@ -396,6 +396,25 @@ TEST(MendedMesh, WarnsOfNormalsAgainstTheWinding) {
       files.path("m.obj") + ": warning: the vertex normals oppose the winding of 1 of 2 faces");
 }
 
+// Two squares that meet at 45 degrees to the ground, in a hollow or on a ridge.
+TEST(MendedMesh, WarnsOfLightLostInHollows) {
+  const TempFiles files;
+  const auto folded = [](double z, const std::string& normals) {
+    const std::string low = " 0\nv ", high = " " + std::to_string(z) + "\n";
+    return "v 0 0" + low + "0 1 0\nv 1 0" + high + "v 1 1" + high + "v -1 0" + high + "v -1 1" +
+           high + normals +
+           "f 1//1 3//2 4//2\nf 1//1 4//2 2//1\nf 5//3 1//1 2//1\nf 5//3 2//1 6//3\n";
+  };
+  const std::string up = "vn 0 0 1\nvn 0 0 1\nvn 0 0 1\n";
+  // Of (1 - cos 45) / 2 the corners below, which do not lift, lose half.
+  EXPECT_EQ(warnings_of(files, folded(1, up)).at(0),
+            files.path("m.obj") +
+                ": warning: flat faces hide 7.3 % of a uniform light from the smooth surface that "
+                "the normals mean (in its hollows): a finer mesh or face_normals loses less");
+  EXPECT_EQ(warnings_of(files, folded(1, "vn 0 0 1\nvn -1 0 1\nvn 1 0 1\n")).size(), 1u);
+  EXPECT_TRUE(warnings_of(files, folded(-1, "vn 0 0 1\nvn 1 0 1\nvn -1 0 1\n")).empty());
+}
+
 TEST(MendedMesh, WarnsOfMissingNormals) {
   const TempFiles files;
   const std::string text = kTriangle +
