@@ -24,18 +24,22 @@ def commands():
 
 
 def escaped(text):
-    """Plain words as Markdown; code within backquotes stays."""
-    return re.sub(r"(`[^`]*`)|([\\*_<>\[\]])", lambda m: m[1] or "\\" + m[2], text)
+    """Plain words as Markdown; code within backquotes stays, options become code."""
+    return re.sub(r"(`[^`]*`)|(--[a-z][\w-]*)|([\\*_<>\[\]])",
+                  lambda m: m[1] or (f"`{m[2]}`" if m[2] else "\\" + m[3]), text)
 
 
 def help_page(text):
     """What --help prints, with a list in place of its columns, which narrow screens would cut."""
-    lines = []
-    for line in text.strip().splitlines():
+    lines, printed = [], text.strip().splitlines()
+    for line, following in zip(printed, [*printed[1:], ""]):
         if line.lower().startswith("usage:"):
             lines += ["```text", line[7:], "```"]
         elif entry := re.match(r"  (\S.*?)(?:  +(.*))?$", line):
-            lines.append(f"- `{entry[1].strip()}`: {escaped(entry[2] or '')}".rstrip())
+            name, words = entry[1], entry[2] or ""
+            if not words and not following.startswith(" " * 30):  # the column begins right behind
+                name, words = line[2:30].strip(), line[30:]
+            lines.append(f"- `{name}`: {escaped(words)}".rstrip())
         elif line.startswith(" ") and lines[-1] == "```":  # a long usage goes on
             lines.insert(-1, line)
         elif line.startswith(" "):
