@@ -73,12 +73,26 @@ class Describer {
       root_references_.push_back(reference_of(element));
     } else if (contains(kObjectTags, element.name)) {
       scene_.objects.push_back(describe_object(element));
+    } else if (is_property_tag(element.name)) {
+      check_setting(element);
     } else {
       std::vector<std::string> known = kObjectTags;
       known.insert(known.end(), {"alias", "default", "include", "path", "ref"});
       std::sort(known.begin(), known.end());
       throw InputError(element.where, "<scene>: unknown element <" + element.name + "> (" +
                                           known_names(known) + ")");
+    }
+  }
+
+  // Mitsuba's settings of ray tracing, which have no meaning here.
+  static void check_setting(const XmlElement& element) {
+    parse_property(element);
+    const std::string& name = element.find("name")->value;
+    const std::vector<std::string> known = {"allow_thread_reordering",
+                                            "compact_acceleration_structures",
+                                            "embree_use_robust_intersections"};
+    if (!contains(known, name) && !name.starts_with("kd_")) {
+      throw InputError(element.where, "<scene>: " + unknown_name("parameter", name, known));
     }
   }
 

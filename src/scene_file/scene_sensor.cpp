@@ -107,14 +107,19 @@ bool read_pixel_format(Properties& p, std::vector<std::string>& warnings) {
   return luminance;
 }
 
-void read_film(const ObjectDescription& object, const SceneDescription& description, Sensor& sensor,
-               std::vector<std::string>& warnings) {
+// sensors: that share the width.
+void read_film(const ObjectDescription& object, const SceneDescription& description, int sensors,
+               Sensor& sensor, std::vector<std::string>& warnings) {
   if (object.type != "hdrfilm") fail_unknown_type(object, {"hdrfilm"});
   DescribedProperties p(object, description, kNoMakers);
   Film& film = sensor.film;
   film.where = object.where;
   sensor.camera.width = bounded_integer(p, "width", 768, 1);
   sensor.camera.height = bounded_integer(p, "height", 576, 1);
+  if (sensor.camera.width % sensors != 0) {
+    p.fail("width", "must be divisible by the number of sensors, " + std::to_string(sensors));
+  }
+  sensor.camera.width /= sensors;
   read_crop(p, sensor.camera, film);
   film.sample_border = p.boolean("sample_border", false);
   const std::string file = choice(p, "file_format", "openexr", {"exr", "openexr", "pfm", "rgbe"});
@@ -248,22 +253,24 @@ void read_lens(Properties& p, Camera& camera) {
 }  // namespace
 
 Sensor read_sensor(const ObjectDescription& sensor, const SceneDescription& description,
-                   std::vector<std::string>& warnings) {
+                   std::vector<std::string>& warnings, const SharedParts& shared) {
   Sensor read;
   read.id = sensor.id;
   const bool orthographic = sensor.type == "orthographic";
   const bool lens = sensor.type == "thinlens";
   if (!orthographic && !lens && sensor.type != "perspective") {
-    fail_unknown_type(sensor, {"orthographic", "perspective", "thinlens"});
+    fail_unknown_type(sensor, {"batch", "orthographic", "perspective", "thinlens"});
   }
   DescribedProperties p(sensor, description, kNoMakers);
   Camera& camera = read.camera;
   if (const ObjectDescription* film = p.nested("film")) {
-    read_film(*film, description, read, warnings);
+    read_film(*film, description, 1, read, warnings);
+  } else if (shared.film) {
+    read_film(*shared.film, description, shared.sensors, read, warnings);
   }
-  if (const ObjectDescription* sampler = p.nested("sampler")) {
-    read_sampler(*sampler, description, read, warnings);
-  }
+  const ObjectDescription* sampler = p.nested("sampler");
+  if (!sampler) sampler = shared.sampler;
+  if (sampler) read_sampler(*sampler, description, read, warnings);
   Matrix4 to_world = p.transform("to_world");
   Vec3d size{1, 1, 1};
   if (orthographic) {

@@ -5,9 +5,17 @@
 
 namespace limn {
 
+// What a batch gives its sensors, in place of what they do not have: each takes its share of the
+// film's width.
+struct SharedParts {
+  const ObjectDescription* film = nullptr;     // null: none
+  const ObjectDescription* sampler = nullptr;  // null: none
+  int sensors = 1;
+};
+
 // Reads a sensor with its film, filter and sampler.
 // Appends whole lines to `warnings`.
 Sensor read_sensor(const ObjectDescription& sensor, const SceneDescription& description,
-                   std::vector<std::string>& warnings);
+                   std::vector<std::string>& warnings, const SharedParts& shared = {});
 
 }  // namespace limn

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <stdexcept>
 
@@ -114,19 +115,17 @@ class SceneBuilder {
     if (p.has("filename")) scene_.data_files.push_back(p.file("filename"));
   }
 
-  // Its sensors, one by one, with films of their own.
+  // Its sensors, one by one: an image each.
   void add_batch(const ObjectDescription& object) {
     DescribedProperties p(object, description_, make_nested_);
     const std::vector<const ObjectDescription*> sensors = p.all_nested("sensor");
-    if (p.nested("film")) {
-      warnings_.push_back(
-          format_warning(object.where, "batch: its film is not used: every sensor has its own"));
-    }
-    p.nested("sampler");
+    const SharedParts shared{p.nested("film"), p.nested("sampler"),
+                             static_cast<int>(sensors.size())};
     p.check_all_used();
     if (sensors.empty()) p.fail("needs sensors");
     for (const ObjectDescription* sensor : sensors) {
-      scene_.sensors.push_back(read_sensor(*sensor, description_, warnings_));
+      if (sensor->type == "batch") p.fail("takes no batch");
+      scene_.sensors.push_back(read_sensor(*sensor, description_, warnings_, shared));
     }
   }
 
@@ -275,8 +274,22 @@ class SceneBuilder {
     return raw;
   }
 
+  // Mitsuba's spheres and cylinders stay round under any transform.
+  void warn_if_stretched(const DescribedProperties& p, const Matrix4& to_world, int axes) {
+    constexpr double kRounding = 1e-5;  // of matrices written with six digits
+    double least = std::numeric_limits<double>::infinity(), most = 0;
+    for (int k = 0; k < axes; ++k) {
+      const double size = std::hypot(to_world.m[0][k], to_world.m[1][k], to_world.m[2][k]);
+      least = std::min(least, size);
+      most = std::max(most, size);
+    }
+    if (most <= least * (1 + kRounding)) return;
+    warnings_.push_back(format_warning(
+        p.where("to_world"), "to_world stretches the " + p.type() + ", which Mitsuba keeps round"));
+  }
+
   // A cylinder about the axis from p0 to p1.
-  static RawMesh read_cylinder(DescribedProperties& p, MeshOptions& options) {
+  RawMesh read_cylinder(DescribedProperties& p, MeshOptions& options) {
     const double radius = p.number("radius", 1);
     if (!(radius > 0)) p.fail("radius", "must be positive");
     const Vec3d p0 = p.point("p0", {}), axis = p.point("p1", {0, 0, 1}) - p0;
@@ -289,10 +302,11 @@ class SceneBuilder {
     }
     if (mirrors(options.to_world)) options.flip_normals = !options.flip_normals;  // as in Mitsuba
     options.to_world = options.to_world * place;
+    warn_if_stretched(p, options.to_world, 2);
     return make_cylinder();
   }
 
-  static RawMesh read_sphere(DescribedProperties& p, MeshOptions& options) {
+  RawMesh read_sphere(DescribedProperties& p, MeshOptions& options) {
     const double radius = p.number("radius", 1);
     if (!(radius > 0)) p.fail("radius", "must be positive");
     const Vec3d center = p.point("center", {});
@@ -303,6 +317,7 @@ class SceneBuilder {
     }
     if (mirrors(options.to_world)) options.flip_normals = !options.flip_normals;  // as in Mitsuba
     options.to_world = options.to_world * place;
+    warn_if_stretched(p, options.to_world, 3);
     return make_sphere();
   }
 

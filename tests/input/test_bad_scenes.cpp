@@ -186,7 +186,7 @@ TEST(BadScene, WhatFollowsFromAMistakeIsNotReported) {
     EXPECT_EQ(message.find('\n'), message.npos) << message;
   }
   EXPECT_EQ(message_of(files, "<scene version=\"3.0.0\"><sensor type=\"fisheye\"/></scene>", {}),
-            "@/s.xml:1:24: error: unknown sensor type \"fisheye\" (known: orthographic, "
+            "@/s.xml:1:24: error: unknown sensor type \"fisheye\" (known: batch, orthographic, "
             "perspective, thinlens)");
 }
 

@@ -219,8 +219,67 @@ TEST(OtherScenes, BatchesAreLists) {
   ASSERT_EQ(scene.sensors.size(), 3u);
   EXPECT_EQ(scene.sensors[1].camera.width, 7);
   EXPECT_EQ(count_sensors(file, {}), 3u);
-  EXPECT_EQ(warnings.size(), 1u);
+  EXPECT_EQ(warnings.size(), 0u);
   EXPECT_NE(message_of("<sensor type=\"batch\"/>").find("sensor \"batch\": needs sensors"),
+            std::string::npos);
+  EXPECT_NE(message_of("<sensor type=\"batch\"><sensor type=\"batch\"/></sensor>")
+                .find("sensor \"batch\": takes no batch"),
+            std::string::npos);
+}
+
+// Sensors without a film of their own share the batch's, side by side.
+TEST(OtherScenes, BatchesShareTheirFilm) {
+  const auto batch = [](int width) {
+    return "<sensor type=\"batch\"><sensor type=\"perspective\"/><sensor type=\"thinlens\"><float "
+           "name=\"aperture_radius\" value=\"0\"/></sensor><film type=\"hdrfilm\"><integer "
+           "name=\"width\" value=\"" +
+           std::to_string(width) +
+           "\"/><integer name=\"height\" value=\"5\"/><rfilter type=\"box\"/></film><sampler "
+           "type=\"independent\"><integer name=\"sample_count\" value=\"9\"/></sampler></sensor>";
+  };
+  const Scene scene = read(batch(14));
+  ASSERT_EQ(scene.sensors.size(), 3u);  // the first is that of all scenes here
+  for (size_t i = 1; i < 3; ++i) {
+    EXPECT_EQ(scene.sensors[i].camera.width, 7);
+    EXPECT_EQ(scene.sensors[i].film.crop_width, 7);
+    EXPECT_EQ(scene.sensors[i].camera.height, 5);
+    EXPECT_EQ(scene.sensors[i].film.filter.kind, Filter::Kind::kBox);
+    EXPECT_EQ(scene.sensors[i].sample_count, 9);
+  }
+  EXPECT_NE(message_of(batch(15)).find("width: must be divisible by the number of sensors, 2"),
+            std::string::npos);
+}
+
+TEST(OtherScenes, StretchedSpheresAreTold) {
+  const auto shape = [](const std::string& type, const std::string& scale) {
+    return "<shape type=\"" + type + "\"><transform name=\"to_world\"><scale value=\"" + scale +
+           "\"/><rotate x=\"1\" angle=\"30\"/></transform></shape>";
+  };
+  for (const auto& [type, scale, count] : {std::tuple{"sphere", "2, 2, 2", 0},
+                                           {"sphere", "1, 1, 1.2", 1},
+                                           {"cylinder", "1, 1, 2", 0},
+                                           {"cylinder", "1, 2, 1", 1},
+                                           {"disk", "1, 2, 1", 0}}) {
+    std::vector<std::string> warnings;
+    read(shape(type, scale), &warnings);
+    ASSERT_EQ(warnings.size(), count) << type << scale;
+    if (count == 0) continue;
+    EXPECT_EQ(
+        warnings[0],
+        "string:2:" +
+            std::to_string(std::string("<shape type=\"").size() + 3 + std::string(type).size()) +
+            ": warning: to_world stretches the " + type + ", which Mitsuba keeps round");
+  }
+}
+
+TEST(OtherScenes, SettingsOfMitsubasRayTracer) {
+  const std::string setting =
+      "<boolean name=\"embree_use_robust_intersections\" value=\"true\"/>"
+      "<integer name=\"kd_max_depth\" value=\"9\"/>";
+  EXPECT_EQ(read(setting).shapes.size(), 0u);
+  EXPECT_NE(message_of("<boolean name=\"spectral\" value=\"true\"/>")
+                .find("<scene>: unknown parameter \"spectral\" (known: allow_thread_reordering, "
+                      "compact_acceleration_structures, embree_use_robust_intersections)"),
             std::string::npos);
 }
 

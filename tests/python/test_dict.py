@@ -235,6 +235,124 @@ def test_curves_keep_their_radius(kind, tmp_path):
     assert np.ptp(points[:, 2]) == pytest.approx(4 if kind == "bsplinecurve" else 9)
 
 
+class Matrix:
+    """As Mitsuba's transforms are: of arrays of one lane, or of numbers."""
+
+    def __init__(self, matrix):
+        self.matrix = matrix
+
+
+class Bitmap:
+    """As Mitsuba's: pixels, and whether they are encoded."""
+
+    def __init__(self, pixels, is_srgb):
+        self.pixels, self.is_srgb = pixels, is_srgb
+
+    def __array__(self, *arguments, **named):
+        return np.asarray(self.pixels, *arguments, **named)
+
+    def srgb_gamma(self):
+        return self.is_srgb
+
+
+def corners_of(transform):
+    return np.asarray(limn.load_dict({
+        "type": "scene", "eye": {"type": "perspective"},
+        "box": {"type": "cube", "to_world": transform}})["box.vertex_positions"])
+
+
+def test_transforms_of_mitsuba():
+    shift = np.eye(4)
+    shift[:3, 3] = [1, 2, 3]
+    expected = corners_of(limn.Transform().translate([1, 2, 3]))
+    for transform in (Matrix(shift), Matrix(shift[:, :, None]), shift.tolist()):
+        assert (corners_of(transform) == expected).all()
+
+
+def test_textures_turn_by_3_x_3_matrices():
+    def board(to_uv):
+        return {"type": "checkerboard", "color0": grey(0.25), "color1": grey(0.75), "to_uv": to_uv}
+
+    expected = card(board(limn.Transform().scale(2)))
+    half = np.diag([2.0, 2.0, 1.0])
+    for to_uv in (half, Matrix(half), Matrix(half[:, :, None])):
+        assert same(card(board(to_uv)), expected)
+    assert not same(card(board(np.eye(3))), expected)
+
+
+# Floats are linear; bytes are sRGB unless raw or told otherwise; alpha is dropped.
+def test_textures_of_pixels(tmp_path):
+    colours = np.full((2, 2, 3), 0.25, dtype=np.float32)
+    colours[0] = 0.75
+    limn.write_exr(str(tmp_path / "a.exr"), colours)
+
+    def of(image, **more):
+        return card({"type": "bitmap", "filter_type": "nearest", **image, **more}, tmp_path)
+
+    expected = of({"filename": "a.exr"})
+    opaque = np.concatenate([colours, np.full((2, 2, 1), 0.5, dtype=np.float32)], axis=2)
+    for image in (colours, colours[:, :, :1], colours[:, :, 0], colours.astype(np.float64), opaque,
+                  Bitmap(colours, False)):
+        assert same(of({"bitmap": image}), expected)
+        assert same(of({"data": image}, raw=True), expected)
+    levels = np.array([64, 191], dtype=np.uint8)
+    encoded = np.repeat(levels[[1, 0], None, None], 2, axis=1)
+    linear = ((levels / 255 + 0.055) / 1.055) ** 2.4
+    for image, more, least, most in (
+            (encoded, {}, *linear), (Bitmap(encoded, True), {}, *linear),
+            (encoded, {"raw": True}, *levels / 255), (Bitmap(encoded, False), {}, *levels / 255)):
+        shown = of({"bitmap": image}, **more)
+        assert np.allclose(shown[1, 1], card(grey(least))[1, 1], rtol=1e-6)
+        assert np.allclose(shown[2, 1], card(grey(most))[2, 1], rtol=1e-6)
+
+
+def test_pixels_of_a_sky():
+    def sky(image):
+        return np.asarray(limn.render(limn.load_dict({
+            "type": "scene", "eye": {"type": "perspective", "film": {
+                "type": "hdrfilm", "width": 4, "height": 4}},
+            "sky": {"type": "envmap", "bitmap": image, "scale": 2.0}}), spp=1))
+
+    assert np.allclose(sky(np.full((4, 8, 3), 0.5)), 1)
+
+
+def test_spectra_of_pairs_and_files(tmp_path):
+    pairs = [(400.0, 0.5), (500.0, 0.8), (600.0, 0.2)]
+    expected = card({"type": "irregular", "wavelengths": "400, 500, 600", "values": "0.5, 0.8, 0.2"})
+    (tmp_path / "a.spd").write_text("400 0.5\n500 0.8\n600 0.2\n")
+    for spectrum in ({"value": pairs}, {"value": np.array(pairs)}, {"filename": tmp_path / "a.spd"},
+                     {"value": "400:0.5, 500:0.8, 600:0.2"}, {"filename": "a.spd"}):
+        assert same(card({"type": "spectrum", **spectrum}, tmp_path), expected)
+
+
+def test_scenes_have_settings_and_batches():
+    eye = {"type": "perspective"}
+    scene = limn.load_dict({
+        "type": "scene", "embree_use_robust_intersections": True,
+        "eyes": {"type": "batch", "left": eye, "right": {**eye, "fov": 20},
+                 "film": {"type": "hdrfilm", "width": 8, "height": 4}}})
+    assert limn.render(scene, spp=1).shape == (4, 4, 3)
+    assert len(scene.sensors) == 2
+
+
+@pytest.mark.parametrize("change, text", [
+    ({"spectral": True}, r'^dict\.spectral: error: <scene>: unknown parameter "spectral" \(known: '),
+    ({"c": {"type": "diffuse", "reflectance": {"type": "spectrum", "value": [(400, 1), 3]}}},
+     r"^dict\.c\.reflectance\.value: error: expected one or three numbers, or pairs"),
+    ({"c": {"type": "diffuse", "reflectance": {"type": "rgb", "value": "red"}}},
+     r'^dict\.c\.reflectance: error: <rgb>: value must be 1 or 3 finite numbers, not "red"'),
+    ({"c": {"type": "diffuse", "reflectance": {"type": "rgb", "value": {"r": 1}}}},
+     r"^dict\.c\.reflectance\.value: error: expected one or three numbers, not \{'r': 1\}"),
+    ({"c": {"type": "diffuse", "reflectance": {"type": "bitmap", "bitmap": [1.0, 2.0]}}},
+     r"^dict\.c\.reflectance: error: pixels have shape \(H, W, 1 to 4\), not \(2,\) of float64"),
+    ({"c": {"type": "cube", "to_world": [[1], [1, 2]]}}, r"^dict\.c\.to_world: error: expected a "),
+])
+def test_mistakes_of_values_have_a_place(folder, change, text):
+    with pytest.raises(limn.InputError) as error:
+        limn.load_dict({**scene_dict(), **change}, str(folder))
+    assert re.match(text, str(error.value)), str(error.value)
+
+
 def test_errors_are_told_together():
     with pytest.raises(limn.InputError) as error:
         limn.load_dict({"type": "scene", "a": {"type": "nope"}, "b": 3,

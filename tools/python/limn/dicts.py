@@ -14,7 +14,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 import numpy.typing as npt
 
-from ._limn import Scene, load_string
+from ._limn import Scene, load_string, write_exr
 from .errors import InputError
 from .meshes import read_foreign, write_ply
 
@@ -22,7 +22,7 @@ from .meshes import read_foreign, write_ply
 TYPES = {
     "integrator": ["aov", "direct", "direct_projective", "moment", "path", "prb", "prb_basic",
                    "prb_projective", "ptracer", "volpath", "volpathmis"],
-    "sensor": ["perspective", "orthographic", "thinlens"],
+    "sensor": ["perspective", "batch", "orthographic", "thinlens"],
     "film": ["hdrfilm"],
     "rfilter": ["box", "gaussian", "tent"],
     "sampler": ["independent", "ldsampler", "multijitter", "orthogonal", "stratified"],
@@ -45,7 +45,44 @@ Three = Sequence[float] | npt.NDArray[Any]
 
 def _three(v: float | Three) -> str:
     values = np.atleast_1d(np.asarray(v, dtype=float))
-    return " ".join(repr(float(x)) for x in values)
+    return " ".join(repr(float(x)) for x in values.reshape(-1))
+
+
+def _matrix(value: Any) -> npt.NDArray[Any] | None:
+    """(4, 4) or (3, 3) numbers, also of Mitsuba's transforms; None of anything else."""
+    matrix = getattr(value, "matrix", value)
+    try:
+        shape = np.shape(matrix)
+    except ValueError:  # rows of several lengths
+        return None
+    if shape not in ((4, 4), (3, 3), (4, 4, 1), (3, 3, 1)):
+        return None
+    return np.asarray(matrix).reshape(shape[:2])
+
+
+def _is_point(value: Any) -> bool:
+    try:
+        return np.shape(value) in ((3,), (3, 1))
+    except ValueError:
+        return False
+
+
+def _pixels(image: Any, raw: bool) -> npt.NDArray[Any]:
+    """Linear (H, W, 1 or 3) pixels of an array, or of Mitsuba's Bitmap. Bytes are sRGB unless raw."""
+    array = np.asarray(image)
+    if array.ndim == 2:
+        array = array[:, :, None]
+    if array.ndim != 3 or not 1 <= array.shape[2] <= 4 or array.dtype.kind not in "fu":
+        raise InputError(f"pixels have shape (H, W, 1 to 4), not {array.shape} of {array.dtype}")
+    array = array[:, :, : 3 if array.shape[2] > 2 else 1]  # without alpha
+    if array.dtype.kind == "f":
+        return array.astype(np.float32)
+    encoded = array / np.iinfo(array.dtype).max
+    is_srgb = getattr(image, "srgb_gamma", lambda: array.dtype == np.uint8)()
+    if raw or not is_srgb:
+        return encoded.astype(np.float32)
+    linear = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
+    return linear.astype(np.float32)
 
 
 class Transform:
@@ -102,14 +139,14 @@ def _checked(place: str, name: Any) -> str:
 class _Writer:
     """XML with one element a line, and for each line what it came from.
 
-    Files are in `folder`; meshes of the dictionary become files in `scratch`.
+    Files are in `folder`; meshes and images of the dictionary become files in `scratch`.
     """
 
     def __init__(self, folder: str, scratch: str) -> None:
         self.folder, self.scratch = folder, scratch
         self.lines: list[str] = []
         self.places: list[str] = []
-        self.files: dict[str, str] = {}  # the place of each mesh
+        self.files: dict[str, str] = {}  # the place of each mesh and image
         self.errors: list[str] = []
 
     def line(self, place: str, text: str) -> None:
@@ -130,8 +167,10 @@ class _Writer:
             self.element(place, "ref", id=_checked(f"{place}.id", what.get("id", "")))
             return
         if kind in ("rgb", "spectrum"):
-            self.element(place, kind, name=name, value=_three(what.get("value", ())))
+            self.element(place, kind, name=name, **self.colour(place, kind, what))
             return
+        if kind in ("bitmap", "envmap") and ("bitmap" in what or "data" in what):
+            what = self.image(place, what)
         if kind not in _TAGS:
             known = ", ".join(sorted([*_TAGS, "mesh", "ref", "rgb"]))
             hint = '; "mesh" reads STL, glTF, ...' if "filename" in what else ""
@@ -153,7 +192,7 @@ class _Writer:
             if key in known:
                 continue
             try:
-                if place == "dict" and not isinstance(value, Mapping):
+                if place == "dict" and not isinstance(value, (Mapping, bool)):
                     raise InputError(f"dict.{key}: error: expected a dictionary with a type")
                 self.value(f"{place}.{key}", _checked(f"{place}.{key}", key), value)
             except InputError as error:
@@ -178,6 +217,34 @@ class _Writer:
             raise InputError(f"{place}: error: {error}") from None
         return {**rest, "type": "ply", "filename": path}
 
+    def colour(self, place: str, kind: str, what: Mapping[str, Any]) -> dict[str, str]:
+        """Attributes of an rgb or spectrum element: of numbers, pairs (wavelength, value), a file."""
+        if kind == "spectrum" and "filename" in what:
+            return {"filename": os.fspath(what["filename"])}
+        value = what.get("value", ())
+        try:
+            if kind == "rgb" or np.size(value) == 1:
+                return {"value": value if isinstance(value, str) else _three(value)}
+            pairs = value if isinstance(value, str) else ", ".join(
+                f"{float(at)!r}:{float(v)!r}" for at, v in value)
+            return {"value": pairs}
+        except (TypeError, ValueError):
+            more = ", or pairs of a wavelength and a number" if kind == "spectrum" else ""
+            raise InputError(
+                f"{place}.value: error: expected one or three numbers{more}, not {value!r}"
+            ) from None
+
+    def image(self, place: str, what: Mapping[str, Any]) -> dict[str, Any]:
+        """The same texture or map with a file that limn reads, of pixels."""
+        rest = {k: v for k, v in what.items() if k not in ("bitmap", "data")}
+        path = os.path.join(self.scratch, f"{len(self.files)}.exr")
+        self.files[path] = place
+        try:
+            write_exr(path, _pixels(what.get("bitmap", what.get("data")), bool(what.get("raw"))))
+        except (TypeError, ValueError) as error:
+            raise InputError(f"{place}: error: {error}") from None
+        return {**rest, "filename": path}
+
     def value(self, place: str, name: str, value: Any) -> None:
         if isinstance(value, Mapping):
             self.object(place, name, value)
@@ -194,14 +261,16 @@ class _Writer:
             self.element(place, "integer", name=name, value=str(int(value)))
         elif isinstance(value, numbers.Real):
             self.element(place, "float", name=name, value=repr(float(value)))
-        elif np.shape(value) == (4, 4):
-            self.value(place, name, Transform(value))
-        elif np.shape(value) == (3,):
+        elif (matrix := _matrix(value)) is not None:
+            self.value(place, name, Transform(matrix))
+        elif isinstance(value, os.PathLike):
+            self.value(place, name, os.fspath(value))
+        elif _is_point(value):
             self.element(place, "point", name=name, value=_three(value))
         else:
             raise InputError(
-                f"{place}: error: expected a number, a word, three numbers, a Transform or (4, 4) "
-                f"array, or a dictionary with a type, not {type(value).__name__}"
+                f"{place}: error: expected a number, a word, three numbers, a Transform, a (4, 4) or "
+                f"(3, 3) array, or a dictionary with a type, not {type(value).__name__}"
             )
 
 
