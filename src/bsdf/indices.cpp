@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "limn/core/names.h"
 
 namespace limn {
@@ -139,11 +141,12 @@ double read_relative_ior(Properties& properties, const std::string& inside) {
 
 ConductorIndices read_conductor_indices(Properties& properties) {
   const std::string name = properties.string("material", "none");
-  const ConductorIndices read{properties.rgb("eta", grey(0.0)), properties.rgb("k", grey(1.0))};
+  ConductorIndices read{properties.rgb("eta", grey(0.0)), properties.rgb("k", grey(1.0))};
   if (name == "none") {
     for (int i = 0; i < 3; ++i) {
-      if (!(read.eta[i] >= 0)) properties.fail("eta", "must not be negative");
-      if (!(read.k[i] >= 0)) properties.fail("k", "must not be negative");
+      // Colours of spectra may be negative. Reflectances depend on squares alone.
+      read.eta[i] = std::fabs(read.eta[i]);
+      read.k[i] = std::fabs(read.k[i]);
       if (read.eta[i] == 0 && read.k[i] == 0) {
         properties.fail("k", "eta and k are both 0 in a channel");
       }

@@ -178,9 +178,7 @@ void read_envmap(Properties& properties, Scene& scene, Shape*) {
   if (!std::isfinite(scale)) properties.fail("scale", "must be finite");
   Vec3d axes[3];
   read_axes(properties, "an envmap", axes);
-  if (properties.boolean("mis_compensation", false)) {
-    properties.fail("mis_compensation", "is not supported (it changes the noise alone)");
-  }
+  properties.boolean("mis_compensation", false);  // changes the noise alone
   const Image image = read_image(file);
   check_finite(image, file, "the environment map");
   scene.environment =

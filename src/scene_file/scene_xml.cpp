@@ -202,17 +202,22 @@ class SceneBuilder {
     DescribedProperties p(object, description_, make_nested_);
     const auto before = scene_.environment;
     read_light(p, scene_, nullptr);
-    p.check_all_used();
+    check_light(p);
     if (scene_.environment == before) return;
     only_one(object, "environment", environment_);
     scene_.environment_id = object.id;
+  }
+
+  static void check_light(DescribedProperties& p) {
+    p.number("sampling_weight", 1);  // changes the noise alone
+    p.check_all_used();
   }
 
   void read_nested_light(const ObjectDescription& object, Shape& shape) {
     read_once(object, [&] {
       DescribedProperties p(object, description_, make_nested_);
       read_light(p, scene_, &shape);
-      p.check_all_used();
+      check_light(p);
     });
   }
 
@@ -225,6 +230,7 @@ class SceneBuilder {
       p.fail("to_world", "the transform is not invertible: it flattens the shape");
     }
     options.flip_normals = p.boolean("flip_normals", false);
+    p.number("silhouette_sampling_weight", 1);  // changes the noise of Mitsuba's derivatives
     if (from_file) {
       options.face_normals = p.boolean("face_normals", false);
     }

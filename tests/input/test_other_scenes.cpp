@@ -272,6 +272,30 @@ TEST(OtherScenes, StretchedSpheresAreTold) {
   }
 }
 
+// As exporters write them where a spectrum's colour has no red; Mitsuba squares them.
+TEST(OtherScenes, NegativeIndicesOfMetals) {
+  const auto metal = [](const std::string& sign) {
+    const Scene scene =
+        read("<bsdf type=\"roughconductor\" id=\"m\"><rgb name=\"eta\" value=\"" + sign +
+             "0.05, 4, 5\"/><rgb name=\"k\" value=\"" + sign + "0.04, 1, 2\"/></bsdf>");
+    return scene.bsdfs_by_id.at("m")->describe();
+  };
+  EXPECT_EQ(metal("-"), metal(""));
+  EXPECT_NE(metal("-").find("eta 0.05 4 5, k 0.04 1 2"), std::string::npos) << metal("-");
+}
+
+// What changes the noise of Mitsuba's images alone.
+TEST(OtherScenes, WeightsOfSampling) {
+  const std::string weight = "<float name=\"sampling_weight\" value=\"2\"/>";
+  const Scene scene = read(
+      "<shape type=\"cube\"><float name=\"silhouette_sampling_weight\" value=\"2\"/>"
+      "<emitter type=\"area\">" +
+      weight + "</emitter></shape><emitter type=\"constant\">" + weight +
+      "</emitter><emitter type=\"point\">" + weight + "</emitter>");
+  EXPECT_TRUE(scene.shapes[0].is_emitter && scene.environment);
+  EXPECT_EQ(scene.delta_lights.size(), 1u);
+}
+
 TEST(OtherScenes, SettingsOfMitsubasRayTracer) {
   const std::string setting =
       "<boolean name=\"embree_use_robust_intersections\" value=\"true\"/>"

@@ -578,7 +578,6 @@ TEST(Bsdf, BadInputIsExplained) {
   expect_error("not both", "roughconductor", {{"material", "Cu"}, {"eta", 1.0}});
   expect_error("unknown material \"Cheese\" (known: none, a-C, Ag, Al,", "roughconductor",
                {{"material", "Cheese"}});
-  expect_error("must not be negative", "roughconductor", {{"k", -1.0}});
   expect_error("eta and k are both 0", "roughconductor", {{"k", 0.0}});
   expect_error("it must lie in [0.1, 10]", "roughplastic", {{"int_ior", 20.0}});
   expect_error("twosided needs one or two nested bsdfs, not 0", "twosided", {});

@@ -233,8 +233,6 @@ TEST(Environment, BadInputIsExplained) {
   sheared.m[0][1] = 0.5;
   expect_error("an envmap can be rotated, not sheared",
                {"emitter", "envmap", {{"filename", file}, {"to_world", sheared}}});
-  expect_error("mis_compensation",
-               {"emitter", "envmap", {{"filename", file}, {"mis_compensation", true}}});
   image.at(2, 1, 1) = std::numeric_limits<float>::quiet_NaN();
   write_exr(file, image, false, {});
   expect_error(file + ": error: the environment map's pixel (column 2, row 1) is not finite",
