@@ -15,6 +15,7 @@
 #include "integrators/contours/radiance_columns.h"
 #include "integrators/contours/sky_record.h"
 #include "integrators/estimates/checksum.h"
+#include "integrators/lights/direct_light_check.h"
 #include "integrators/methods/visibility_estimator.h"
 #include "limn/core/environment_map.h"
 #include "limn/core/error.h"
@@ -51,6 +52,21 @@ void check_scene_and_memory(const Scene& scene, int spp, int lines) {
     throw InputError({scene.file}, fmt::format("bake: direct light alone is kept: set the "
                                                "integrator's max_depth to 2 (it is {})",
                                                scene.max_depth));
+  }
+  for (const auto& light : scene.delta_lights) {
+    throw InputError({scene.file}, fmt::format("bake: {}: views are of light from shapes and "
+                                               "the map alone: remove it",
+                                               quoted_name("emitter", light->id)));
+  }
+  for (const Shape& shape : scene.shapes) {
+    for (const bool front : {true, false}) {
+      const Bsdf* const side = shape.bsdf->side(front);
+      if (!side || side->is_lambertian()) continue;
+      throw InputError(shape.where,
+                       fmt::format("bake: {}: only diffuse surfaces without textures are baked, "
+                                   "this is {}: make it diffuse, or render under each map",
+                                   shape_in_text(shape), side->describe()));
+    }
   }
   const Film& film = scene.film;
   const double points = static_cast<double>(film.crop_width) * film.crop_height * spp;
