@@ -25,19 +25,18 @@ namespace {
                                            join(nearest_names(name, names, 5)) + ")");
 }
 
-// Whether a texture in use jumps where no edge is known: then nothing may move.
+// Whether a texture in use jumps where no edge is known: then nothing may move. Those of surfaces
+// list the borders of their texels, but for the slopes of bumps, which jump between faces, too.
 bool has_texel_borders(const Scene& scene) {
-  const auto jumps = [](const Texture* texture) {
-    return texture && texture->jumps_between_texels();
-  };
   for (const Shape& shape : scene.shapes) {
-    if (jumps(shape.radiance_texture.get())) return true;
     for (int k = 0; k < shape.bsdf->texture_count(); ++k) {
-      if (jumps(&shape.bsdf->texture(k))) return true;
+      const Texture& texture = shape.bsdf->texture(k);
+      if (texture.jumps_between_texels() && texture.jumps_between_faces()) return true;
     }
   }
-  return std::any_of(scene.delta_lights.begin(), scene.delta_lights.end(),
-                     [&](const auto& light) { return jumps(light->texture()); });
+  return std::any_of(scene.delta_lights.begin(), scene.delta_lights.end(), [](const auto& light) {
+    return light->texture() && light->texture()->jumps_between_texels();
+  });
 }
 
 void add_moving_parameters(const Scene& scene, std::vector<Parameter>& list) {
@@ -53,8 +52,8 @@ void check_nothing_moves(const Scene& scene, const std::string& name) {
       continue;
     }
     throw InputError({scene.file}, "parameter \"" + name +
-                                       "\": texels' borders would move unseen, of a texture "
-                                       "with filter_type nearest: use bilinear");
+                                       "\": texels' borders would move unseen, of the "
+                                       "nearest bitmap of a light or bumpmap: use bilinear");
   }
 }
 

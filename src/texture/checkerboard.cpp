@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "src/texture/types.h"
+#include "src/texture/grid_lines.h"
 
 namespace limn {
 namespace {
@@ -41,10 +41,7 @@ class Checkerboard final : public Texture {
   }
   bool add_jumps(const std::array<std::array<double, 2>, 3>& uv, size_t most,
                  Jumps& jumps) const override {
-    std::array<std::array<double, 2>, 3> at;
-    for (int k = 0; k < 3; ++k) at[k] = to_uv_(uv[k]);
-    return add_lines({at[0][0], at[1][0], at[2][0]}, most, jumps) &&
-           add_lines({at[0][1], at[1][1], at[2][1]}, most, jumps);
+    return add_grid_lines(uv, to_uv_, {2, 2}, most, jumps);
   }
   bool has_period_one() const override { return to_uv_.keeps_integers(); }
   std::vector<ParameterRef> parameters() override {
@@ -71,37 +68,6 @@ class Checkerboard final : public Texture {
     const std::array<double, 2> uv = to_uv_(std::array{value(point.uv[0]), value(point.uv[1])});
     const auto second_half = [](double t) { return t - std::floor(t) > 0.5; };
     return as<S>(colors_[second_half(uv[0]) == second_half(uv[1]) ? 0 : 1]);
-  }
-
-  // Where t, linear over the face from these values at its corners, is a multiple of one half.
-  static bool add_lines(const std::array<double, 3>& t, size_t most, Jumps& jumps) {
-    const auto [least, greatest] = std::minmax({t[0], t[1], t[2]});
-    // Lines so near to a side or corner are along it: texture coordinates are rounded to floats.
-    const double near = 0x1p-24 * (greatest - least);
-    for (int k = 0; k < 3; ++k) {
-      const double a = t[k], b = t[(k + 1) % 3], line = 0.5 * std::round(2 * a);
-      if (std::fabs(a - line) <= near && std::fabs(b - line) <= near) jumps.sides |= 1 << k;
-    }
-    const double first = std::floor(2 * (least + near)) + 1, end = std::ceil(2 * (greatest - near));
-    if (end - first > static_cast<double>(most) - static_cast<double>(jumps.inside.size())) {
-      return false;
-    }
-    for (double i = first; i < end; ++i) jumps.inside.push_back(line_at(t, 0.5 * i));
-    return true;
-  }
-  // level: between two of the values.
-  static Jump line_at(const std::array<double, 3>& t, double level) {
-    std::array<std::array<double, 2>, 2> ends{};
-    int count = 0;
-    for (int k = 0; k < 3 && count < 2; ++k) {
-      const int next = (k + 1) % 3;
-      if ((t[k] < level) == (t[next] < level)) continue;
-      const double s = (level - t[k]) / (t[next] - t[k]);
-      if (k > 0) ends[count][k - 1] = 1 - s;
-      if (next > 0) ends[count][next - 1] = s;
-      ++count;
-    }
-    return {ends[0], ends[1]};
   }
 
   Rgb<Dual> colors_[2];

@@ -7,6 +7,8 @@
 #include "edgetree/forest/forest_build.h"
 #include "integrators/edges/face_jumps.h"
 #include "integrators/edges/texture_jumps.h"
+#include "limn/core/image.h"
+#include "limn/core/rng.h"
 #include "limn/edgetree/edge_sampler_types.h"
 #include "limn/integrators/gradient.h"
 #include "support/check_runs.h"
@@ -106,6 +108,27 @@ TEST(FaceJumps, AreWhereACheckerboardJumps) {
       std::array<Place, 3> uv;
       for (Place& corner : uv) corner = {4 * rng.uniform() - 2, 4 * rng.uniform() - 2};
       expect_jumps_at_segments(*checkerboard(to_uv), mesh_of_face(uv), FaceId(0), rng);
+    }
+  }
+}
+
+// Of two colours in turn, so that each line is one of another colour.
+TEST(FaceJumps, AreWhereNearestTexelsJump) {
+  const TempFiles files;
+  Image image(4, 2, 1);
+  for (int i = 0; i < 8; ++i) image.at(i % 4, i / 4, 0) = static_cast<float>((i + i / 4) % 2);
+  write_exr(files.path("a.exr"), image, false, {});
+  Rng rng(1, 0, 0);
+  for (const Matrix4& to_uv : {Matrix4{}, turned_uv()}) {
+    test::TestProperties properties("texture", "bitmap",
+                                    {{"filename", files.path("a.exr")},
+                                     {"filter_type", std::string("nearest")},
+                                     {"to_uv", to_uv}});
+    const std::shared_ptr<Texture> texture = make_texture(properties);
+    for (int i = 0; i < 50; ++i) {
+      std::array<Place, 3> uv;
+      for (Place& corner : uv) corner = {4 * rng.uniform() - 2, 4 * rng.uniform() - 2};
+      expect_jumps_at_segments(*texture, mesh_of_face(uv), FaceId(0), rng);
     }
   }
 }
@@ -304,16 +327,20 @@ TEST(TextureEdges, Seams) {
   EXPECT_EQ(along, 2u);
 }
 
-// A cylinder with interpolated normals, and a board, both checkered, over gloss that mirrors them.
-Scene still_life(const TempFiles& files, double scale) {
+const std::string kCheckers = R"(<texture type="checkerboard" name="reflectance">
+                                 <rgb name="color0" value=".8, .7, .6"/>
+                                 <rgb name="color1" value=".1, .2, .3"/>)";
+
+// A cylinder with interpolated normals, and a board, both checkered or of a texture that is left
+// open, over gloss that mirrors them.
+Scene still_life(const TempFiles& files, double scale, const std::string& texture = kCheckers) {
   SceneParts parts;
   parts.origin = {0, 2, 4};
   parts.film = R"(<rfilter type="tent"/>)";
   const std::string board = fmt::format(
-      R"(<bsdf type="diffuse"><texture type="checkerboard" name="reflectance">
-         <rgb name="color0" value=".8, .7, .6"/><rgb name="color1" value=".1, .2, .3"/>
+      R"(<bsdf type="diffuse">{}
          <transform name="to_uv"><scale x="{}" y="{}"/></transform></texture></bsdf>)",
-      scale, scale);
+      texture, scale, scale);
   parts.body =
       square("floor", 2, -90, {0, 0, 0}, conductor("gloss", 0.3)) +
       square("board", 0.8, -60, {0.6, 0.8, -0.6}, board) +
@@ -350,6 +377,55 @@ TEST(TextureEdges, DerivativesAgreeWithDifferences) {
   for (const char* name : {"board.translate.x", "can.rotate.y", "can.scale", "floor.translate.y",
                            "sensor.translate.x", "sensor.fov"})
     expect_agreement(scene, name, 256);
+}
+
+std::string nearest(const std::string& file, const std::string& wrap) {
+  return fmt::format(R"(<texture type="bitmap" name="reflectance">
+                     <string name="filename" value="{}"/><boolean name="raw" value="true"/>
+                     <string name="filter_type" value="nearest"/>
+                     <string name="wrap_mode" value="{}"/>)",
+                     file, wrap);
+}
+
+TEST(TextureEdges, OfTexelsAgreeWithDifferences) {
+  const TempFiles files;
+  Image image(5, 3, 3);
+  Rng rng(2, 0, 0);
+  for (float& x : image.data) x = static_cast<float>(rng.uniform());
+  write_exr(files.path("a.exr"), image, false, {});
+  for (const char* wrap : {"repeat", "mirror", "clamp"}) {
+    const Scene scene = still_life(files, 1.5, nearest(files.path("a.exr"), wrap));
+    for (const char* name : {"board.translate.x", "can.rotate.y", "sensor.fov"})
+      expect_agreement(scene, name, 256);
+  }
+}
+
+// Two texels by two are a checkerboard, sample by sample.
+TEST(TextureEdges, OfTexelsAreACheckerboards) {
+  const TempFiles files;
+  Image image(2, 2, 3);
+  const float colors[2][3] = {{0.8f, 0.7f, 0.6f}, {0.1f, 0.2f, 0.3f}};
+  for (int i = 0; i < 4; ++i) {
+    for (int c = 0; c < 3; ++c) image.at(i % 2, i / 2, c) = colors[(i % 2 + i / 2) % 2][c];
+  }
+  write_exr(files.path("a.exr"), image, false, {});
+  GradientOptions options;
+  options.parameters = {"board.translate.x", "can.rotate.y"};
+  RunSettings settings;
+  settings.spp = 4;
+  const GradientResult texels =
+      gradient(still_life(files, 2, nearest(files.path("a.exr"), "repeat")), options, settings);
+  const GradientResult squares = gradient(still_life(files, 2), options, settings);
+  for (size_t p = 0; p < 2; ++p) {
+    const Moments &a = texels.parameters[p].total, &b = squares.parameters[p].total;
+    double apart = 0, size = 0;
+    for (size_t i = 0; i < a.size(); ++i) {
+      apart += std::fabs(a.mean(i) - b.mean(i));
+      size += std::fabs(b.mean(i));
+    }
+    EXPECT_GT(size, 0);
+    EXPECT_LT(apart, 1e-5 * size);  // colours are floats
+  }
 }
 
 // Where regions of light are apart, no list of outlines has the edges inside of a lamp.

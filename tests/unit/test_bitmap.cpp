@@ -249,11 +249,17 @@ TEST(Bitmap, ByReference) {
   EXPECT_EQ(red_at(changed.shapes[1].bsdf->texture(0), 0.25, 0.25), 0);
 }
 
-TEST(Bitmap, NearestTexelsTakeNothingThatMoves) {
+// Their borders are edges (test_texture_edges.cpp), but those of bumps and light are not.
+TEST(Bitmap, NearestTexelsOfBumpsTakeNothingThatMoves) {
   const TempFiles files;
-  const std::string file = two_by_two(files);
-  const Scene scene = read(bitmap(file, choice("filter_type", "nearest")));
-  for (const Parameter& p : list_parameters(scene)) EXPECT_EQ(p.name, "b.reflectance.data");
+  const std::string file = two_by_two(files), use = choice("filter_type", "nearest");
+  EXPECT_NO_THROW(find_parameter(read(bitmap(file, use)), "s.translate.x"));
+  const Scene scene = read_scene_text(
+      "<scene version=\"3.0.0\"><sensor type=\"perspective\" id=\"sensor\"/>"
+      "<shape type=\"rectangle\" id=\"s\"><bsdf type=\"bumpmap\"><texture type=\"bitmap\" "
+      "name=\"bumps\"><string name=\"filename\" value=\"" +
+          file + "\"/>" + use + "</texture><bsdf type=\"diffuse\"/></bsdf></shape></scene>",
+      "", {}, nullptr);
   for (const char* name : {"s.translate.x", "sensor.fov", "s.vertex_positions.0.x"}) {
     std::string message;
     try {
@@ -262,10 +268,9 @@ TEST(Bitmap, NearestTexelsTakeNothingThatMoves) {
       message = error.what();
     }
     EXPECT_EQ(message, "string: error: parameter \"" + std::string(name) +
-                           "\": texels' borders would move unseen, of a texture with filter_type "
-                           "nearest: use bilinear");
+                           "\": texels' borders would move unseen, of the nearest bitmap of a "
+                           "light or bumpmap: use bilinear");
   }
-  EXPECT_NO_THROW(find_parameter(scene, "b.reflectance.data.0.0.r"));
   EXPECT_THROW(find_parameter(scene, "s.translate.w"), UnknownParameter);
 }
 

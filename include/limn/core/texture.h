@@ -85,8 +85,8 @@ class Texture : public TexelMap {
   }
   // Whether `eval` may jump at every edge of the mesh.
   virtual bool jumps_between_faces() const { return false; }
-  // Whether it also jumps at the borders of texels, which add_jumps does not list: derivatives with
-  // respect to what moves are then refused.
+  // Whether it jumps at the borders of texels. Where these are no edges (of light, of bumps),
+  // derivatives with respect to what moves are refused.
   virtual bool jumps_between_texels() const { return false; }
   // Whether texture coordinates that differ by integers look up the same value.
   virtual bool has_period_one() const { return false; }
