@@ -213,15 +213,24 @@ class TermJob {
   }
 
   // What moving directions change in one term they take back in the others, and at every jump of
-  // radiance there must be an edge: of what smooth lobes see there are none.
+  // radiance there must be an edge: of what smooth lobes show there may be none.
   bool has_all_edges() const {
-    return scene_.shading == ShadingModel::kContinuous && !find_smooth(scene_);
+    if (!has_all_edges_) {
+      has_all_edges_ = scene_.shading == ShadingModel::kContinuous &&
+                       find_chain_light(pass(0).context(), 0).shapes.empty();
+    }
+    return *has_all_edges_;
+  }
+  // Of edges that vertices see by way of mirrors no term takes back what turned directions change.
+  bool sees_no_mirrors() const {
+    const FlatMirrors* const mirrors = pass(0).context().flat_mirrors;
+    return !mirrors || mirrors->mirrors().empty();
   }
   bool can_move_directions() const {
     for (size_t t = 0; t < types_.size(); ++t) {
       if (types_[t]->moved_with_directions && !computed_[t]) return false;
     }
-    return has_all_edges();
+    return has_all_edges() && sees_no_mirrors();
   }
   // The same of positions on the film, which change all terms.
   bool can_move_film() const {
@@ -278,10 +287,11 @@ class TermJob {
       plan.uniform = samples_.value_or(SampleCounts{});
       if (!options_.samples)
         plan = plan_by_pilot(p, budget_of(p, settings, watch, is_long), result);
-      if (method_.random_directions && can_move_directions() && !pass(p).motion_rates().still()) {
-        plan.grid = PlanGrid(scene_.film, film_size(scene_.film));
-        plan.fields = random_fields(plan.grid.size(), pass(p), settings.seed);
-        if (can_move_film()) plan.film = random_motions(plan.grid.size(), pass(p), settings.seed);
+      if (method_.random_directions && !pass(p).motion_rates().still()) {
+        const bool turns = can_move_directions(), film = can_move_film();
+        if (turns || film) plan.grid = PlanGrid(scene_.film, film_size(scene_.film));
+        if (turns) plan.fields = random_fields(plan.grid.size(), pass(p), settings.seed);
+        if (film) plan.film = random_motions(plan.grid.size(), pass(p), settings.seed);
       }
       plan.numbers = method_.numbers;
       for (size_t t = 0; t < types_.size(); ++t) {
@@ -572,6 +582,7 @@ class TermJob {
   const GradientOptions& options_;
   TermMethod method_;
   bool moves_film_;  // whether positions on the film may move
+  mutable std::optional<bool> has_all_edges_;
   std::vector<Parameter> parameters_;
   Moved moved_;                          // by any of the parameters
   std::vector<const TermType*> types_;   // that can differ from zero

@@ -32,11 +32,24 @@ std::string ball_and_screens(const TempFiles& files) {
          make_sky(files, "sky");
 }
 
-Scene scene_with(const TempFiles& files, const std::string& film, int size) {
+// Edges seen in a mirror, by the camera and by the floor, and through a mask.
+std::string before_a_mirror(const TempFiles& files) {
+  const std::string half = R"(<bsdf type="mask"><float name="opacity" value="0.5"/>)" +
+                           diffuse("soot", "0.1, 0.1, 0.1") + "</bsdf>";
+  return square("floor", 2.5, -90, {0, 0, 0}, diffuse("stone", "0.7, 0.7, 0.7")) +
+         square("mirror", 2, 0, {0, 1, -1.5}, R"(<bsdf type="conductor"/>)") +
+         square("screen", 0.3, 20, {-0.8, 0.9, -0.3}, half) +
+         obj_shape("ball", write_mesh(files, "ball.obj", icosphere_mesh(1)), true, 0.4,
+                   {0.4, 0.8, 0.2}, diffuse("clay", "0.7, 0.5, 0.3")) +
+         square("lamp", 0.2, 90, {0.3, 2.4, 0.5}, area_light("glow", "30, 25, 20")) +
+         make_sky(files, "sky");
+}
+
+Scene scene_with(const TempFiles& files, const std::string& film, int size, bool mirror = false) {
   SceneParts parts;
   parts.film = film;
   parts.width = parts.height = size;
-  parts.body = ball_and_screens(files);
+  parts.body = mirror ? before_a_mirror(files) : ball_and_screens(files);
   return make_scene(files, parts);
 }
 
@@ -44,8 +57,12 @@ Scene scene_with(const TempFiles& files, const std::string& film, int size) {
 // against the others, has mean zero. Also where the film ends and cuts filters.
 TEST(FilmMotion, TakesBackWhatItAdds) {
   const TempFiles files;
-  for (const char* filter : kFilters) {
-    const Scene scene = scene_with(files, filter, 8);
+  for (const auto& [filter, mirror] : {std::pair{kFilters[0], false},
+                                       {kFilters[1], false},
+                                       {kFilters[2], false},
+                                       {kFilters[3], false},
+                                       {kFilters[1], true}}) {
+    const Scene scene = scene_with(files, filter, 8, mirror);
     const EdgeSamplerType& sampler = edge_sampler_type("silhouettes");
     const auto terms = terms_of(scene, sampler, false, true);
     const Parameter parameter = find_parameter(scene, "ball.translate.y");
@@ -127,6 +144,31 @@ TEST(FilmMotion, KeepsTheMean) {
     expect_same_mean(scene, {"ball.translate.x", "sensor.rotate.y"},
                      {"silhouettes:directions=random:film=moving"}, 128);
   }
+}
+
+// Where the camera sees edges by way of a mirror, positions move but directions of the floor, which
+// sees them, too, do not.
+TEST(FilmMotion, KeepsTheMeanBeforeAMirror) {
+  const TempFiles files;
+  const Scene scene = scene_with(files, kFilters[1], 8, true);
+  const std::string method = "silhouettes:directions=random:film=moving";
+  expect_same_mean(scene, {"ball.translate.x", "sensor.rotate.y", "mirror.translate.z"}, {method},
+                   1024);
+  const auto moves = [&](const Scene& of) {
+    double share = 0;
+    for (const MethodSetting& setting :
+         run_method(of, {"ball.translate.x"}, method, 4, 1).settings) {
+      if (setting.name.starts_with("share of pixels")) share = std::get<double>(setting.value);
+    }
+    return share > 0;
+  };
+  EXPECT_TRUE(moves(scene));
+  // A curved mirror shows edges that are not known.
+  SceneParts parts;
+  parts.body = before_a_mirror(files) +
+               R"(<shape type="sphere"><float name="radius" value="0.4"/><bsdf type="conductor"/>
+                  </shape>)";
+  EXPECT_FALSE(moves(make_scene(files, parts)));
 }
 
 // Edges at rest right on pixels' borders, and on the film's, where filters end at once: rays see
