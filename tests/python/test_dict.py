@@ -283,7 +283,7 @@ def test_textures_turn_by_3_x_3_matrices():
 # Floats are linear; bytes are sRGB unless raw or told otherwise; alpha is dropped.
 def test_textures_of_pixels(tmp_path):
     colours = np.full((2, 2, 3), 0.25, dtype=np.float32)
-    colours[0] = 0.75
+    colours[0] = 0.75, 0.5, 0.125
     limn.write_exr(str(tmp_path / "a.exr"), colours)
 
     def of(image, **more):
@@ -291,10 +291,12 @@ def test_textures_of_pixels(tmp_path):
 
     expected = of({"filename": "a.exr"})
     opaque = np.concatenate([colours, np.full((2, 2, 1), 0.5, dtype=np.float32)], axis=2)
-    for image in (colours, colours[:, :, :1], colours[:, :, 0], colours.astype(np.float64), opaque,
-                  Bitmap(colours, False)):
+    for image in (colours, colours.astype(np.float64), opaque, Bitmap(colours, False)):
         assert same(of({"bitmap": image}), expected)
         assert same(of({"data": image}, raw=True), expected)
+    red = of({"bitmap": np.repeat(colours[:, :, :1], 3, axis=2)})
+    assert same(of({"bitmap": colours[:, :, 0]}), red) and not same(red, expected)
+    assert same(of({"bitmap": colours[:, :, :1]}), red)
     levels = np.array([64, 191], dtype=np.uint8)
     encoded = np.repeat(levels[[1, 0], None, None], 2, axis=1)
     linear = ((levels / 255 + 0.055) / 1.055) ** 2.4
