@@ -9,6 +9,7 @@
 #include "integrators/backward/reverse_estimator.h"
 #include "integrators/estimates/batches.h"
 #include "integrators/methods/hair_gaps.h"
+#include "limn/core/exposure.h"
 #include "limn/core/names.h"
 #include "limn/integrators/methods.h"
 #include "limn/integrators/parts.h"
@@ -51,7 +52,7 @@ void identify(const ReverseEstimator& estimator, const Image& adjoint,
 
 // watch: runs since the job began.
 template <class Estimator>
-BackwardResult run(std::unique_ptr<Estimator> owned, const Image& adjoint,
+BackwardResult run(const Scene& scene, std::unique_ptr<Estimator> owned, const Image& adjoint,
                    const BackwardOptions& options, const RunSettings& settings,
                    const Stopwatch& watch) {
   constexpr bool kExact = std::is_same_v<Estimator, FacesGradient>;
@@ -67,7 +68,16 @@ BackwardResult run(std::unique_ptr<Estimator> owned, const Image& adjoint,
   result.setup_seconds = watch.seconds();
   std::vector<std::unique_ptr<SampleEstimator>> estimators;
   estimators.push_back(std::move(owned));
-  run_batches(estimators, settings, watch, [&](const Batch& batch, const auto& sums) {
+  EstimatorsAt at;
+  if (!kExact && is_moving(scene)) {
+    at = [&](double u) {
+      EstimatorsAtTime now;
+      now.list.push_back(
+          std::make_unique<ReverseEstimator>(scene, adjoint, options, settings.threads, u));
+      return now;
+    };
+  }
+  const auto take = [&](const Batch& batch, const auto& sums) {
     std::vector<std::vector<double>> numbers = sums[0].images;
     const std::vector<double> counts = numbers.back();
     numbers.pop_back();
@@ -82,7 +92,8 @@ BackwardResult run(std::unique_ptr<Estimator> owned, const Image& adjoint,
     result.non_finite.merge(sums[0].non_finite);
     result.spp += batch.count();
     ++result.batches;
-  });
+  };
+  run_batches(estimators, settings, watch, take, at);
 
   const bool moves = moved_in(estimator.scene(), estimator.parameters().parameters()).any();
   if (!kExact && moves && result.spp > 0 && options.find_gaps) {
@@ -101,7 +112,7 @@ BackwardResult backward(const Scene& scene, const Image& adjoint, const Backward
   const Stopwatch watch;
   const RunSettings settings = settings_for(options.points, asked);
   const auto run_with = [&](auto estimator) {
-    return run(std::move(estimator), adjoint, options, settings, watch);
+    return run(scene, std::move(estimator), adjoint, options, settings, watch);
   };
   if (options.points == FilmPoints::kFaces) {
     return run_with(std::make_unique<FacesGradient>(scene, adjoint, options, settings.threads));
@@ -113,6 +124,7 @@ std::vector<std::string> trace_backward(const Scene& scene, const Image& adjoint
                                         const BackwardOptions& options, const RunSettings& settings,
                                         const NonFinite::SampleId& place) {
   check(options);
+  check_still(scene, "a look at one sample");
   SampleLog log;
   const auto trace = [&](const auto& estimator) {
     for (const Parameter& p : estimator.parameters().parameters()) {

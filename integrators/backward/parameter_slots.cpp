@@ -5,16 +5,33 @@
 #include <utility>
 
 #include "limn/core/check.h"
+#include "limn/core/error.h"
+#include "limn/core/exposure.h"
+#include "limn/core/moved.h"
 #include "limn/core/tangent.h"
 
 namespace limn {
+
+namespace {
+
+// Whether a parameter moves more than one shape's vertices, as times of a shutter do.
+bool moves_unknown(const Scene& scene, const Parameter& parameter) {
+  if (!moved_by({&parameter, 1}).vertices) return false;
+  for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
+    if (!parameter.velocities(scene, ShapeId(s)).empty()) return false;
+  }
+  return true;
+}
+
+}  // namespace
 
 std::vector<Parameter> reverse_parameters(const Scene& scene, const BackwardOptions& options) {
   if (!options.found.empty()) return options.found;
   std::vector<Parameter> parameters;
   if (options.parameters.empty()) {
     parameters = list_parameters(scene);
-    std::erase_if(parameters, [](const Parameter& p) { return p.repeats; });
+    std::erase_if(parameters,
+                  [&](const Parameter& p) { return p.repeats || moves_unknown(scene, p); });
     return parameters;
   }
   for (const std::string& name : options.parameters)
@@ -112,10 +129,13 @@ class ParameterSlots::Values {
   }
 };
 
-ParameterSlots::ParameterSlots(const Scene& scene, std::vector<Parameter> parameters)
+ParameterSlots::ParameterSlots(const Scene& scene, std::vector<Parameter> parameters,
+                               const std::optional<double>& time)
     : parameters_(std::move(parameters)),
+      time_(time),
       scene_(deep_copy(scene)),
       size_(scene.shapes.empty() ? 1 : bounds_of(scene).diagonal()) {
+  if (time_) set_time(scene_, *time_);
   slots_.scene = &scene_;
   slots_.meshes.resize(scene.shapes.size());
   free_.shapes.assign(scene.shapes.size(), false);
@@ -142,6 +162,10 @@ uint32_t ParameterSlots::take(uint32_t count, double unit) {
 
 ParameterSlots::Dependence ParameterSlots::dependence_of(const Scene& scene,
                                                          const Parameter& parameter) const {
+  if (moves_unknown(scene, parameter)) {
+    throw InputError({scene.file}, "reverse mode cannot take the parameter \"" + parameter.name +
+                                       "\": forward mode (gradient) can");
+  }
   Dependence dependence;
   dependence.texels = parameter.texel_map(scene_);
   if (parameter.array.size() == 3) return dependence;
@@ -152,8 +176,9 @@ ParameterSlots::Dependence ParameterSlots::dependence_of(const Scene& scene,
     }
   }
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
-    const std::vector<Vec3d> velocity = parameter.velocities(scene, ShapeId(s));
+    std::vector<Vec3d> velocity = parameter.velocities(scene, ShapeId(s));
     if (velocity.empty()) continue;
+    if (time_ && parameter.size == 1) velocity = velocities_now(scene, parameter, s);
     dependence.shape = ShapeId(s);
     dependence.directions = parameter.directions(scene);
     for (uint32_t v = 0; v < velocity.size() && parameter.size == 1; ++v) {
@@ -163,12 +188,26 @@ ParameterSlots::Dependence ParameterSlots::dependence_of(const Scene& scene,
     if (scene.shapes[s].mesh.normal_source != NormalSource::kGiven || parameter.size > 1) break;
     Scene copy = deep_copy(scene);
     parameter.seed(copy, 0);
+    if (time_) set_time(copy, *time_);
     for (const Vec3<Lanes>& d : copy.shapes[s].mesh.normal_tangents) {
       dependence.normal_velocity.push_back({d.x[0], d.y[0], d.z[0]});
     }
     break;
   }
   return dependence;
+}
+
+// Of a shape's vertices at the time.
+std::vector<Vec3d> ParameterSlots::velocities_now(const Scene& scene, const Parameter& parameter,
+                                                  uint32_t shape) const {
+  Scene copy = deep_copy(scene);
+  parameter.seed(copy, 0);
+  set_time(copy, *time_);
+  std::vector<Vec3d> velocities;
+  for (const Vec3<Lanes>& d : copy.shapes[shape].mesh.position_tangents) {
+    velocities.push_back({d.x[0], d.y[0], d.z[0]});
+  }
+  return velocities;
 }
 
 void ParameterSlots::add_shapes(const Scene& scene) {
@@ -185,6 +224,7 @@ void ParameterSlots::add_shapes(const Scene& scene) {
     MeshSlots& slots = slots_.meshes[s];
     slots.positions = take(3 * count, size_);
     gathers_[s].copies.resize(count);
+    if (time_) gathers_[s].back = pulls_back(scene, ShapeId(s), *time_);
     for (const uint32_t root : mesh.weld) ++gathers_[s].copies[root];
     slots.directions = take(3 * static_cast<uint32_t>(mesh.u_directions.size()));
     if (mesh.normal_source == NormalSource::kFace) continue;
@@ -203,6 +243,7 @@ std::vector<uint32_t> ParameterSlots::take_values(const Scene& scene) {
     if (dependences_[i].shape.valid() || dependences_[i].texels) continue;
     Scene copy = deep_copy(hull);
     parameters_[i].seed(copy, 0);
+    if (time_) set_time(copy, *time_);
     const std::vector<Dual*> values = Values::of(copy);
     for (size_t k = 0; k < values.size(); ++k) {
       if (values[k]->d[0] == 0) continue;
@@ -306,18 +347,23 @@ void ParameterSlots::gather_shape(ShapeId shape, const std::vector<double>& sums
   }
   pull_back_u_directions(mesh, vectors(slots.directions, mesh.u_directions.size()), positions);
   const std::vector<uint32_t>& copies = gathers_[shape.index()].copies;
+  // By vertices at the reference time.
+  std::vector<Vec3d> of_vertices = positions;
+  if (const auto& back = gathers_[shape.index()].back) {
+    for (Vec3d& d : of_vertices) d = back->vector(d);
+  }
   for (size_t i = 0; i < parameters_.size(); ++i) {
     const Dependence& dependence = dependences_[i];
     if (dependence.shape != shape) continue;
     for (size_t v = 0; v < dependence.directions.size(); ++v) {
       const uint32_t root = mesh.weld[v];
-      values[i][v] = dot(positions[root], dependence.directions[v]) / copies[root];
+      values[i][v] = dot(of_vertices[root], dependence.directions[v]) / copies[root];
     }
     if (!dependence.directions.empty()) continue;
     if (parameters_[i].size > 1) {
       for (size_t v = 0; v < mesh.weld.size(); ++v) {
         const uint32_t root = mesh.weld[v];
-        for (int k = 0; k < 3; ++k) values[i][3 * v + k] = positions[root][k] / copies[root];
+        for (int k = 0; k < 3; ++k) values[i][3 * v + k] = of_vertices[root][k] / copies[root];
       }
       continue;
     }

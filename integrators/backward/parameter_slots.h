@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "integrators/terms/camera_edges.h"
+#include "limn/core/matrix.h"
 #include "limn/core/normals_adjoint.h"
 #include "limn/core/parameter.h"
 #include "limn/core/scene.h"
@@ -20,13 +21,16 @@ std::vector<Parameter> reverse_parameters(const Scene& scene, const BackwardOpti
 
 class ParameterSlots {
  public:
-  ParameterSlots(const Scene& scene, std::vector<Parameter> parameters);
+  // time: of the shutter, see at_time(); none: the reference time. InputError for parameters that
+  // reverse mode cannot take.
+  ParameterSlots(const Scene& scene, std::vector<Parameter> parameters,
+                 const std::optional<double>& time = {});
   ParameterSlots(const ParameterSlots&) = delete;
   ParameterSlots& operator=(const ParameterSlots&) = delete;
 
   const std::vector<Parameter>& parameters() const { return parameters_; }
-  // A copy of the scene. The vertices of shapes that move have unit tangents in the first three
-  // lanes: nothing is known of their motion.
+  // A copy of the scene, at the time. The vertices of shapes that move have unit tangents in the
+  // first three lanes: nothing is known of their motion.
   const Scene& scene() const { return scene_; }
   const SceneSlots& slots() const { return slots_; }
   const FreeMotion& free() const { return free_; }
@@ -60,10 +64,14 @@ class ParameterSlots {
   struct ShapeGather {
     std::vector<uint32_t> copies;  // of each vertex that is the first of its copies
     std::optional<ShadingNormalsAdjoint> normals;
+    // What takes derivatives now to those by vertices at the reference time; none: nothing.
+    std::optional<Matrix4> back;
   };
   class Values;
 
   uint32_t take(uint32_t count, double unit = 1);
+  std::vector<Vec3d> velocities_now(const Scene& scene, const Parameter& parameter,
+                                    uint32_t shape) const;
   void add_shapes(const Scene& scene);
   std::vector<uint32_t> take_values(const Scene& scene);
   void add_values(const Scene& scene);
@@ -73,6 +81,7 @@ class ParameterSlots {
                     std::vector<std::vector<double>>& values) const;
 
   std::vector<Parameter> parameters_;
+  std::optional<double> time_;
   std::vector<Dependence> dependences_;  // of each
   Scene scene_;
   double size_;  // of the scene

@@ -22,11 +22,12 @@
 namespace limn {
 
 ReverseEstimator::ReverseEstimator(const Scene& scene, const Image& adjoint,
-                                   const BackwardOptions& options, int threads)
+                                   const BackwardOptions& options, int threads,
+                                   const std::optional<double>& time)
     : options_(options),
       film_(scene.film, adjoint_pixels(scene, adjoint)),
       choice_(film_.pixels(), options.uniform_pixels),
-      parameters_(scene, reverse_parameters(scene, options)),
+      parameters_(scene, reverse_parameters(scene, options), time),
       method_(*options.method->reverse),
       moved_(moved_in(scene, parameters_.parameters())),
       traced_(parameters_.scene(), threads, {.closed = method_.closed, .edges = moved_.any()}),

@@ -18,8 +18,9 @@ namespace limn {
 class ReverseEstimator final : public GradientEstimator {
  public:
   // InputError as backward().
+  // time: as of ParameterSlots.
   ReverseEstimator(const Scene& scene, const Image& adjoint, const BackwardOptions& options,
-                   int threads);
+                   int threads, const std::optional<double>& time = {});
   ReverseEstimator(const ReverseEstimator&) = delete;
   ReverseEstimator& operator=(const ReverseEstimator&) = delete;
 

@@ -7,6 +7,7 @@
 #include "integrators/estimates/batches.h"
 #include "integrators/pilot/term_estimator.h"
 #include "limn/core/error.h"
+#include "limn/core/exposure.h"
 #include "limn/core/field_error.h"
 #include "limn/core/parameter.h"
 #include "limn/integrators/backward.h"
@@ -124,11 +125,16 @@ std::vector<Moments> forward_sums(const Scene& scene, std::span<const Parameter>
   for (size_t first = 0; first < parameters.size(); first += kLanes) {
     const auto some =
         parameters.subspan(first).first(std::min<size_t>(kLanes, parameters.size() - first));
-    std::vector<std::unique_ptr<SampleEstimator>> estimators;
-    estimators.push_back(std::make_unique<TermEstimator>(
-        scene, some, types, computed, sampler, settings.threads, TermExtras{.closed = closed}));
+    const auto at_u = [&](const std::optional<double>& u) {
+      EstimatorsAtTime now;
+      now.list.push_back(std::make_unique<TermEstimator>(scene, some, types, computed, sampler,
+                                                         settings.threads,
+                                                         TermExtras{.closed = closed, .time = u}));
+      return now;
+    };
+    const EstimatorsAtTime still = at_u(std::nullopt);
     const Stopwatch watch;
-    run_batches(estimators, settings, watch, [&](const Batch& batch, const auto& sums) {
+    const auto take = [&](const Batch& batch, const auto& sums) {
       const std::vector<std::vector<double>>& images = sums[0].images;
       for (size_t k = 0; k < some.size(); ++k) {
         double sum = 0;
@@ -139,7 +145,9 @@ std::vector<Moments> forward_sums(const Scene& scene, std::span<const Parameter>
         }
         moments[first + k].add_batch({sum}, batch.count());
       }
-    });
+    };
+    run_batches(still.list, settings, watch, take,
+                is_moving(scene) ? EstimatorsAt(at_u) : EstimatorsAt());
   }
   return moments;
 }

@@ -398,10 +398,61 @@ size_t steps_to_make(Estimators estimators, RunSettings settings) {
   return std::max<size_t>(1, steps);
 }
 
+// Batches have so many times at most: estimators are set up for each. Not tuned.
+constexpr int kMostTimes = 16;
+
+// In [0, 1), the k-th of n strata. Where numbers are even in the run, times are, too.
+double draw_time(Estimators estimators, const Batch& part, int k, int n) {
+  const bool even = std::ranges::any_of(estimators, [](const auto& estimator) {
+    return estimator->numbers() == Numbers::kEvenInRun;
+  });
+  constexpr uint64_t kStream = 0x74696d65;  // apart from pixels
+  const auto sample = static_cast<uint32_t>(part.first);
+  Rng rng = even ? Rng::even(part.seed, kStream, sample) : Rng(part.seed, kStream, sample);
+  return even ? rng.uniform() : (k + rng.uniform()) / n;
+}
+
+void add(const std::vector<double>& from, std::vector<double>& to) {
+  for (size_t i = 0; i < to.size(); ++i) to[i] += from[i];
+}
+
+void merge(const BatchSums& from, const SampleEstimator& estimator, BatchSums& to) {
+  add(from.radiance, to.radiance);
+  const bool counts = gradient_of(estimator) != nullptr;  // in the last image
+  for (size_t i = 0; i + counts < to.images.size(); ++i) add(from.images[i], to.images[i]);
+  if (counts) {
+    to.images.back()[0] += from.images.back()[0];
+    to.images.back()[1] = std::max(to.images.back()[1], from.images.back()[1]);
+  }
+  for (size_t slot = 0; slot < to.costs.size(); ++slot) to.costs[slot].merge(from.costs[slot]);
+  to.non_finite.merge(from.non_finite);
+}
+
+// A batch whose samples have times.
+std::vector<BatchSums> run_batch_at(const EstimatorsAt& at, Estimators estimators,
+                                    const Batch& batch, int threads, ProgressCounter& progress) {
+  if (!at) return run_batch(estimators, batch, threads, progress);
+  std::vector<BatchSums> sums;
+  const int times = std::min(batch.count(), kMostTimes);
+  const auto begin = [&](int k) {
+    return batch.first + static_cast<int>(int64_t{batch.count()} * k / times);
+  };
+  for (int k = 0; k < times; ++k) {
+    const Batch part{batch.seed, begin(k), begin(k + 1)};
+    const EstimatorsAtTime now = at(draw_time(estimators, part, k, times));
+    std::vector<BatchSums> more = run_batch(now.list, part, threads, progress);
+    if (progress.stopped()) return {};
+    for (size_t i = 0; i < sums.size(); ++i) merge(more[i], *estimators[i], sums[i]);
+    if (sums.empty()) sums = std::move(more);
+  }
+  return sums;
+}
+
 }  // namespace
 
 void run_batches(Estimators estimators, const RunSettings& settings, const Stopwatch& watch,
-                 const std::function<void(const Batch&, const std::vector<BatchSums>&)>& collect) {
+                 const std::function<void(const Batch&, const std::vector<BatchSums>&)>& collect,
+                 const EstimatorsAt& at) {
   // What an interrupted pilot chose is no part of a run.
   if (settings.interrupted && settings.interrupted->load()) return;
   if (settings.store) start(*settings.store, estimators, settings);
@@ -410,7 +461,7 @@ void run_batches(Estimators estimators, const RunSettings& settings, const Stopw
   std::vector<BatchSums> first;  // one sample, by which the size of batches is chosen
   if (EqualBatches* equal = batches.needs_size()) {
     const Stopwatch one;
-    first = run_batch(estimators, {settings.seed, 0, 1}, settings.threads, progress);
+    first = run_batch_at(at, estimators, {settings.seed, 0, 1}, settings.threads, progress);
     equal->set_size(one.seconds());
   }
   while (!progress.stopped() && batches.next()) {
@@ -423,7 +474,7 @@ void run_batches(Estimators estimators, const RunSettings& settings, const Stopw
     } else if (!first.empty() && batch.last == 1) {
       sums = std::move(first);
     } else {
-      sums = run_batch(estimators, batch, settings.threads, progress);
+      sums = run_batch_at(at, estimators, batch, settings.threads, progress);
       if (progress.stopped()) break;
       if (settings.store) settings.store->write(to_record(batch, sums));
     }

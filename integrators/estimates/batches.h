@@ -28,10 +28,21 @@ void check_memory(Estimators estimators);
 // Steps that run_batch reports for each sample of a batch.
 size_t steps_per_sample(Estimators estimators);
 
+// The estimators of a run at a time, as at_time() has it, and what they refer to.
+struct EstimatorsAtTime {
+  std::vector<std::shared_ptr<const void>> kept = {};
+  std::vector<std::unique_ptr<SampleEstimator>> list = {};
+};
+using EstimatorsAt = std::function<EstimatorsAtTime(double u)>;
+
 // Runs batch after batch until all samples are done, the time is over or the run is interrupted.
 // collect(batch, sums) takes the sums of every finished batch.
+// at: where the scene moves, makes the estimators of a time, of the kind of `estimators`. Each
+// sample of all pixels has a time of its own, or several samples have where batches are large;
+// times are uniform, and stratified in a batch. Null: the estimators are those of all times.
 void run_batches(Estimators estimators, const RunSettings& settings, const Stopwatch& watch,
-                 const std::function<void(const Batch&, const std::vector<BatchSums>&)>& collect);
+                 const std::function<void(const Batch&, const std::vector<BatchSums>&)>& collect,
+                 const EstimatorsAt& at = nullptr);
 
 // InputError if the film has no such pixel.
 void check_pixel(const Film& film, const NonFinite::SampleId& place);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "limn/core/exposure.h"
 #include "limn/core/light.h"
 #include "limn/core/mesh_attribute.h"
 #include "limn/core/parameter.h"
@@ -96,11 +97,31 @@ void add_camera(const Scene& scene, Hash& hash) {
   hash.add(f.filter.stddev);
 }
 
+void add_course(const Course& course, Hash& hash) {
+  for (const Keyframe& key : course.keyframes) {
+    hash.add(key.time);
+    hash.add(key.place);
+    for (int k = 0; k < 9; ++k) hash.add(key.scale * key.rotation.m[k / 3][k % 3]);
+  }
+  hash.add(course.velocity);
+  hash.add(course.spin);
+}
+
+void add_exposure(const Scene& scene, Hash& hash) {
+  const Exposure& exposure = *scene.exposure;
+  hash.add(exposure.reference);
+  hash.add(exposure.shutters[scene.sensor].open);
+  hash.add(exposure.shutters[scene.sensor].close);
+  add_course(exposure.cameras[scene.sensor], hash);
+  for (const Course& course : exposure.shapes) add_course(course, hash);
+}
+
 }  // namespace
 
 std::string fingerprint(const Scene& scene) {
   Hash hash;
   add_camera(scene, hash);
+  if (is_moving(scene)) add_exposure(scene, hash);
   for (const int v :
        {scene.max_depth, scene.rr_depth, int{scene.hide_emitters}, static_cast<int>(scene.shading)})
     hash.add(static_cast<uint64_t>(v));

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "limn/core/error.h"
+#include "limn/core/exposure.h"
 #include "limn/core/parallel.h"
 #include "limn/core/shading.h"
 
@@ -89,6 +90,7 @@ class PixelLists {
 
 void PixelRegions::check(const Scene& scene, const RegionsUser& user) {
   const Film& film = scene.film;
+  check_still(scene, user.name);
   if (!scene.camera.is_pinhole()) {
     throw InputError({scene.file},
                      fmt::format("{} needs a pinhole, a sensor of type \"perspective\" ({} takes "

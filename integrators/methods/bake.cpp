@@ -19,6 +19,7 @@
 #include "integrators/methods/visibility_estimator.h"
 #include "limn/core/environment_map.h"
 #include "limn/core/error.h"
+#include "limn/core/exposure.h"
 #include "limn/core/memory.h"
 #include "limn/core/parallel.h"
 #include "limn/integrators/methods.h"
@@ -43,6 +44,7 @@ std::string_view bytes_of(const std::vector<T>& numbers) {
 }
 
 void check_scene_and_memory(const Scene& scene, int spp, int lines) {
+  check_still(scene, "bake");
   if (!scene.environment) {
     throw InputError({scene.file},
                      "bake: the scene has no environment that a map could replace: add one, as "

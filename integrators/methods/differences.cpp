@@ -2,10 +2,11 @@
 #include "limn/integrators/differences.h"
 
 #include <algorithm>
-#include <deque>
+#include <memory>
 
 #include "integrators/estimates/batches.h"
 #include "integrators/methods/radiance_estimator.h"
+#include "limn/core/exposure.h"
 #include "limn/core/parameter.h"
 
 namespace limn {
@@ -51,40 +52,57 @@ CentralDifferences central_differences(const Scene& scene, const std::vector<Dif
                                        int block, const RunSettings& settings, bool even) {
   const Stopwatch watch;
   const Numbers numbers = even ? Numbers::kEvenInBatches : Numbers::kIndependent;
-  const PathChoices choices(scene);
-  std::deque<Scene> moved;  // keeps its elements where they are
-  std::vector<std::unique_ptr<SampleEstimator>> estimators;
+  std::vector<Scene> moved;
   CentralDifferences result;
   for (const DifferenceJob& job : jobs) {
     const Parameter parameter = find_parameter(scene, job.parameter);
     for (const double step : job.steps) {
-      for (const double h : {step, -step}) {
-        moved.push_back(parameter.moved(scene, h));
-        estimators.push_back(
-            std::make_unique<RadianceEstimator>(moved.back(), choices, settings.threads, numbers));
-      }
+      for (const double h : {step, -step}) moved.push_back(parameter.moved(scene, h));
     }
     result.estimates.emplace_back(job.combinations.size(), DifferenceEstimate(scene.film, block));
   }
+  const auto at = [&](const auto& placed) {
+    const auto unmoved = placed(scene);
+    const auto choices = std::make_shared<const PathChoices>(*unmoved);
+    EstimatorsAtTime now{{unmoved, choices}};
+    for (const Scene& one : moved) {
+      const auto there = placed(one);
+      now.kept.push_back(there);
+      now.list.push_back(
+          std::make_unique<RadianceEstimator>(*there, *choices, settings.threads, numbers));
+    }
+    return now;
+  };
+  const EstimatorsAtTime still =
+      at([](const Scene& one) { return std::shared_ptr<const Scene>(&one, [](const Scene*) {}); });
+  const EstimatorsAt at_times = [&](double u) {
+    return at([&](const Scene& one) { return std::make_shared<const Scene>(at_time(one, u)); });
+  };
+  const auto& estimators = still.list;
   check_memory(estimators);
   result.radiance = Moments(film_size(scene.film));
   result.setup_seconds = watch.seconds();
-  run_batches(estimators, settings, watch, [&](const Batch& batch, const auto& sums) {
-    const BatchSums* images = sums.data();
-    result.radiance.add_batch(mean_of_two(images[0].radiance, images[1].radiance), batch.count());
-    for (size_t j = 0; j < jobs.size(); ++j) {
-      for (size_t k = 0; k < jobs[j].combinations.size(); ++k) {
-        result.estimates[j][k].add_batch(combine(images, jobs[j].steps, jobs[j].combinations[k]),
-                                         scene.film, block, batch.count());
-      }
-      images += 2 * jobs[j].steps.size();
-    }
-    for (const BatchSums& s : sums) {
-      result.cost.merge(s.costs[0]);
-      result.non_finite.merge(s.non_finite);
-    }
-    result.spp += batch.count();
-  });
+  run_batches(
+      estimators, settings, watch,
+      [&](const Batch& batch, const auto& sums) {
+        const BatchSums* images = sums.data();
+        result.radiance.add_batch(mean_of_two(images[0].radiance, images[1].radiance),
+                                  batch.count());
+        for (size_t j = 0; j < jobs.size(); ++j) {
+          for (size_t k = 0; k < jobs[j].combinations.size(); ++k) {
+            result.estimates[j][k].add_batch(
+                combine(images, jobs[j].steps, jobs[j].combinations[k]), scene.film, block,
+                batch.count());
+          }
+          images += 2 * jobs[j].steps.size();
+        }
+        for (const BatchSums& s : sums) {
+          result.cost.merge(s.costs[0]);
+          result.non_finite.merge(s.non_finite);
+        }
+        result.spp += batch.count();
+      },
+      std::ranges::any_of(moved, is_moving) ? at_times : EstimatorsAt());
   result.seconds = watch.seconds();
   return result;
 }

@@ -6,6 +6,7 @@
 #include "integrators/estimates/batches.h"
 #include "integrators/paths/camera_path.h"
 #include "limn/core/error.h"
+#include "limn/core/exposure.h"
 #include "limn/core/names.h"
 #include "limn/core/shading.h"
 
@@ -152,6 +153,7 @@ LayersResult render_layers(const Scene& scene, const std::vector<std::string>& n
                            const RunSettings& settings) {
   const Stopwatch watch;
   const std::vector<const LayerType*> types = find_types(names);
+  check_still(scene, "layers");
   std::vector<std::unique_ptr<SampleEstimator>> estimators;
   estimators.push_back(std::make_unique<LayerEstimator>(scene, types, settings.threads));
   check_memory(estimators);

@@ -12,6 +12,7 @@
 #include "integrators/methods/visibility_estimator.h"
 #include "limn/core/check.h"
 #include "limn/core/error.h"
+#include "limn/core/exposure.h"
 #include "limn/core/field_error.h"
 #include "limn/core/names.h"
 #include "limn/integrators/methods.h"
@@ -49,6 +50,7 @@ std::unique_ptr<SampleEstimator> make_estimator(const Scene& scene, const RunSet
   check_task(options.method, Task::kImage);
   const ImageMethod& method = *options.method->image;
   const Numbers numbers = numbers_of(options.generator);  // checked for all
+  if (method.looks_around) check_still(scene, "the method \"" + options.method.name() + "\"");
   check_points(options.points, method.closed_light, options.method.name());
   if (!method.looks_around && options.what != RenderWhat::kImage) {
     throw InputError(
@@ -102,20 +104,37 @@ EstimatorList estimators_of(const Scene& scene, const RunSettings& settings,
 }
 
 // watch: runs since the job began.
-RenderResult run(const EstimatorList& estimators, const RunSettings& settings,
-                 const Stopwatch& watch, size_t size, FilmPoints points) {
+RenderResult run(const Scene& scene, const EstimatorList& estimators, const RunSettings& settings,
+                 const Stopwatch& watch, const RenderOptions& options) {
+  const FilmPoints points = options.points;
+  const size_t size = film_size(scene.film);
+  EstimatorsAt at;
+  Scene start;
+  if (is_moving(scene)) {
+    start = scene;
+    find_overlaps(start, settings.threads);
+    at = [&](double u) {
+      const auto there = std::make_shared<const Scene>(at_time(start, u));
+      EstimatorsAtTime now{{there}};
+      now.list.push_back(make_estimator(*there, settings, options));
+      return now;
+    };
+  }
   RenderResult result;
   result.radiance = Moments(size);
-  run_batches(estimators, settings, watch, [&](const Batch& batch, const auto& sums) {
-    if (points == FilmPoints::kFaces) {
-      result.radiance.add_exact(sums[0].radiance);
-    } else {
-      result.radiance.add_batch(sums[0].radiance, batch.count());
-    }
-    result.rays += sums[0].costs[0].rays;
-    result.non_finite.merge(sums[0].non_finite);
-    result.spp += batch.count();
-  });
+  run_batches(
+      estimators, settings, watch,
+      [&](const Batch& batch, const auto& sums) {
+        if (points == FilmPoints::kFaces) {
+          result.radiance.add_exact(sums[0].radiance);
+        } else {
+          result.radiance.add_batch(sums[0].radiance, batch.count());
+        }
+        result.rays += sums[0].costs[0].rays;
+        result.non_finite.merge(sums[0].non_finite);
+        result.spp += batch.count();
+      },
+      at);
   result.seconds = watch.seconds();
   return result;
 }
@@ -137,7 +156,7 @@ RenderResult render(const Scene& scene, const RunSettings& asked, const RenderOp
     // Other machines must have chosen the same.
     settings.store->identify("choice of the pilot", fingerprint(around->choice()));
   }
-  RenderResult result = run(estimators, settings, watch, film_size(scene.film), options.points);
+  RenderResult result = run(scene, estimators, settings, watch, options);
   if (around && around->missed() > 0) {
     result.warnings.push_back(fmt::format(
         "{} integrals did not reach the tolerance {} with {} lines: ask for a larger one",
@@ -162,7 +181,7 @@ std::vector<RenderResult> render_seeds(const Scene& scene, const RunSettings& se
   std::vector<RenderResult> results;
   for (const uint64_t seed : seeds) {
     own.seed = seed;
-    results.push_back(run(estimators, own, Stopwatch(), film_size(scene.film), options.points));
+    results.push_back(run(scene, estimators, own, Stopwatch(), options));
   }
   return results;
 }
@@ -175,6 +194,7 @@ std::vector<std::string> trace_sample(const Scene& scene, const RunSettings& set
     return trace_sample(with_direct_light_alone(scene), settings, place, of_radiance(options));
   }
   check_pixel(scene.film, place);
+  check_still(scene, "a look at one sample");
   const auto estimator = make_estimator(scene, settings, options);
   SampleLog log;
   run_pixel_sample(*estimator, settings.seed, {place.x, place.y, place.sample}, log);

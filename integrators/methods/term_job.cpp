@@ -13,6 +13,7 @@
 #include "integrators/estimates/batches.h"
 #include "integrators/film/film_regions.h"
 #include "integrators/methods/selection.h"
+#include "integrators/methods/term_sums.h"
 #include "integrators/paths/chain_light.h"
 #include "integrators/pilot/allocation.h"
 #include "integrators/pilot/field_fit.h"
@@ -22,6 +23,7 @@
 #include "integrators/pilot/random_motion.h"
 #include "integrators/pilot/term_estimator.h"
 #include "limn/core/error.h"
+#include "limn/core/exposure.h"
 #include "limn/core/field_error.h"
 #include "limn/core/moved.h"
 #include "limn/core/parameter.h"
@@ -30,33 +32,6 @@
 
 namespace limn {
 namespace {
-
-// Collects sums of batches into the moments of one parameter. sums: of its lane, for each term
-// (empty for those that are not computed).
-void collect(const std::vector<const std::vector<double>*>& sums, const std::vector<TermRun>& terms,
-             int samples, const Film& film, int block, ParameterGradient& g) {
-  const int width = film.crop_width;
-  const int height = film.crop_height;
-  std::vector<double> edges(film_size(film));
-  std::vector<double> total(film_size(film));
-  // Terms of edges by themselves first: the order of a sum decides its last bits.
-  for (const bool of_edges : {true, false}) {
-    for (size_t t = 0; t < terms.size(); ++t) {
-      if (!sums[t] || terms[t].edges != of_edges) continue;
-      std::vector<double>& to = of_edges ? edges : total;
-      for (size_t i = 0; i < to.size(); ++i) to[i] += (*sums[t])[i];
-    }
-  }
-  for (size_t i = 0; i < total.size(); ++i) total[i] += edges[i];
-  for (size_t t = 0; t < terms.size(); ++t) {
-    if (!sums[t]) continue;
-    g.terms[t].add_batch(*sums[t], samples);
-    if (block > 0) g.term_blocks[t].add_batch(sum_blocks(*sums[t], width, height, block), samples);
-  }
-  g.total.add_batch(total, samples);
-  g.image_sum.add_batch(sum_blocks(total, width, height, std::max(width, height)), samples);
-  if (block > 0) g.total_blocks.add_batch(sum_blocks(total, width, height, block), samples);
-}
 
 // What a pilot chose: other machines must have chosen the same.
 void identify_plan(const std::vector<TermRun>& terms, BatchStore& store) {
@@ -91,6 +66,9 @@ constexpr double kFilmShare = 1.0 / 4;
 constexpr int kLongRun = 256;
 constexpr double kSetupShare = 1.0 / 32;
 
+// When a pilot looks at a scene that moves: at the reference time velocities change nothing.
+constexpr double kPilotTime = 0.75;  // not tuned
+
 // A whole run of one method.
 class TermJob {
  public:
@@ -99,25 +77,21 @@ class TermJob {
       : scene_(scene),
         options_(options),
         method_(method),
-        moves_film_(method.moves_film && !options.exact_film && scene.camera.is_pinhole()),
+        moving_(is_moving(scene)),
+        // What a pilot finds of turns and of positions on the film holds for its own time alone.
+        moves_film_(method.moves_film && !options.exact_film && scene.camera.is_pinhole() &&
+                    !moving_),
         types_(terms_of(scene, method.sampler, method.closed, moves_film_)) {
     const std::vector<std::string> chosen = selected_terms(term_names(), options.terms, scene.file);
     if (options.samples) check_samples(*options.samples);
     for (const auto& name : options.parameters) parameters_.push_back(find_parameter(scene, name));
     moved_ = moved_in(scene, parameters_);
     keep_changed(chosen);
-    std::shared_ptr<const FilmRegions> visible;
     if (options.exact_film) {
-      visible = std::make_shared<FilmRegions>(scene, settings.threads, settings.interrupted);
+      visible_ = std::make_shared<FilmRegions>(scene, settings.threads, settings.interrupted);
     }
-    const Warping warping{options.warp, method.unbiased};
-    for (size_t k = 0; k < parameters_.size(); k += kLanes) {
-      const auto some =
-          std::span(parameters_).subspan(k).first(std::min<size_t>(kLanes, parameters_.size() - k));
-      passes_.push_back(std::make_unique<TermEstimator>(
-          scene, some, types_, computed_, method.sampler, settings.threads,
-          TermExtras{visible, method.warps ? &warping : nullptr, method.closed, moves_film_}));
-    }
+    if (moving_) method_.moves_directions = method_.random_directions = false;
+    passes_ = passes_at(moving_ ? std::optional(kPilotTime) : std::nullopt, settings.threads);
   }
 
   GradientResult run(const RunSettings& settings, const Stopwatch& watch) {
@@ -133,15 +107,24 @@ class TermJob {
     plan(settings, watch, result);
     if (settings.store) identify_plan(result.terms, *settings.store);
     result.setup_seconds = watch.seconds();
-    run_batches(passes_, settings, watch, [&](const Batch& batch, const auto& sums) {
+    const EstimatorsAt at = [&](double u) {
+      EstimatorsAtTime now{{}, passes_at(u, settings.threads)};
+      for (size_t p = 0; p < passes_.size(); ++p) {
+        static_cast<TermEstimator&>(*now.list[p]).set_plan(pass(p).plan());
+      }
+      return now;
+    };
+    const auto take = [&](const Batch& batch, const auto& sums) {
       add_batch(batch.count(), sums, result);
-    });
+    };
+    run_batches(passes_, settings, watch, take, moving_ ? at : EstimatorsAt());
     result.seconds = watch.seconds();
     if (method_.warps) describe_warping(result);
     return result;
   }
 
   std::vector<std::string> trace(const RunSettings& settings, const NonFinite::SampleId& place) {
+    check_still(scene_, "a look at one sample");
     GradientResult unused = empty_result();
     const Stopwatch watch;
     plan(settings, watch, unused);
@@ -161,6 +144,21 @@ class TermJob {
   }
 
  private:
+  // time: of the shutter; none: the reference time.
+  std::vector<std::unique_ptr<SampleEstimator>> passes_at(const std::optional<double>& time,
+                                                          int threads) const {
+    const Warping warping{options_.warp, method_.unbiased};
+    const TermExtras extras{visible_, method_.warps ? &warping : nullptr, method_.closed,
+                            moves_film_, time};
+    std::vector<std::unique_ptr<SampleEstimator>> passes;
+    for (size_t k = 0; k < parameters_.size(); k += kLanes) {
+      const auto some =
+          std::span(parameters_).subspan(k).first(std::min<size_t>(kLanes, parameters_.size() - k));
+      passes.push_back(std::make_unique<TermEstimator>(scene_, some, types_, computed_,
+                                                       method_.sampler, threads, extras));
+    }
+    return passes;
+  }
   // The rows of terms that can differ from zero, with their samples.
   void keep_changed(const std::vector<std::string>& chosen) {
     const std::vector<const TermType*> all = types_;
@@ -581,8 +579,10 @@ class TermJob {
   const Scene& scene_;
   const GradientOptions& options_;
   TermMethod method_;
+  bool moving_;      // whether samples have times
   bool moves_film_;  // whether positions on the film may move
   mutable std::optional<bool> has_all_edges_;
+  std::shared_ptr<const FilmRegions> visible_;
   std::vector<Parameter> parameters_;
   Moved moved_;                          // by any of the parameters
   std::vector<const TermType*> types_;   // that can differ from zero

@@ -10,7 +10,9 @@
 #include "integrators/paths/camera_path.h"
 #include "integrators/paths/path_follow.h"
 #include "limn/core/duplicate_faces.h"
+#include "limn/core/exposure.h"
 #include "limn/core/framed_light.h"
+#include "limn/core/moved.h"
 #include "limn/core/names.h"
 
 namespace limn {
@@ -101,11 +103,10 @@ bool moves_what_is_seen(const Scene& scene, std::span<const Parameter> parameter
   for (Shape& shape : hull.shapes) shape.mesh = {};
   return std::ranges::any_of(parameters, [&](const Parameter& parameter) {
     if (parameter.texel_map(scene)) return false;
-    for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
-      if (!parameter.velocities(scene, ShapeId(s)).empty()) return true;
-    }
+    if (moved_by({&parameter, 1}).vertices) return true;
     Scene copy = deep_copy(hull);
     parameter.seed(copy, 0);
+    set_time(copy, 1);
     return values_move(copy);
   });
 }

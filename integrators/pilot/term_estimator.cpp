@@ -9,14 +9,17 @@
 #include "integrators/paths/camera_path.h"
 #include "integrators/paths/path_follow.h"
 #include "integrators/paths/path_log.h"
+#include "limn/core/exposure.h"
 #include "limn/core/moved.h"
 
 namespace limn {
 namespace {
 
-Scene seeded(const Scene& scene, std::span<const Parameter> parameters) {
+Scene seeded(const Scene& scene, std::span<const Parameter> parameters,
+             const std::optional<double>& time) {
   Scene copy = deep_copy(scene);
   for (size_t k = 0; k < parameters.size(); ++k) parameters[k].seed(copy, static_cast<int>(k));
+  if (time) set_time(copy, *time);
   return copy;
 }
 
@@ -63,7 +66,7 @@ TermEstimator::TermEstimator(const Scene& scene, std::span<const Parameter> para
                              const std::vector<bool>& computed, const EdgeSamplerType& sampler,
                              int threads, const TermExtras& extras)
     : changed_(changed_terms(types, computed, moved_in(scene, parameters))),
-      scene_(seeded(scene, parameters)),
+      scene_(seeded(scene, parameters, extras.time)),
       lanes_(static_cast<int>(parameters.size())),
       lane_scale_(natural_steps(parameters)),
       traced_(scene_, threads,

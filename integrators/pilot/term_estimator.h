@@ -2,6 +2,7 @@
 // The terms of a derivative image as one estimator: up to kLanes parameters of one scene.
 #include <array>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -32,6 +33,7 @@ struct TermExtras {
   const Warping* warping = nullptr;                      // null where directions are not warped
   bool closed = false;  // what surfaces scatter is known in closed form, see closed_light.h
   bool moved_film = false;
+  std::optional<double> time = {};  // of the shutter, see at_time(); none: the reference time
 };
 
 class TermEstimator final : public SampleEstimator {
@@ -46,6 +48,7 @@ class TermEstimator final : public SampleEstimator {
 
   // What samples hold from now on.
   void set_plan(SamplePlan plan);
+  const SamplePlan& plan() const { return plan_; }
   // What samples of a slot cost, see Term::work and first_work.
   double work(size_t slot, const TermCost& cost) const;
   double first_work(size_t slot, const TermCost& cost) const;

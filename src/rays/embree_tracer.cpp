@@ -17,6 +17,7 @@
 #include "limn/core/check.h"
 #include "limn/core/coincident_faces.h"
 #include "limn/core/error.h"
+#include "limn/core/exposure.h"
 #include "limn/core/parallel.h"
 #include "limn/core/ray_tracer.h"
 #include "limn/core/touch.h"
@@ -211,7 +212,9 @@ class EmbreeTracer final : public RayTracer {
  public:
   EmbreeTracer(const Scene& scene, int threads, std::shared_ptr<const CoincidentFaces> faces)
       : scene_(scene),
-        faces_(faces ? std::move(faces) : std::make_shared<CoincidentFaces>(scene, threads)),
+        faces_(faces             ? std::move(faces)
+               : has_none(scene) ? scene.exposure->no_overlaps
+                                 : std::make_shared<CoincidentFaces>(scene, threads)),
         copies_(faces_->copies),
         overlaps_(faces_->overlaps),
         settles_(!copies_.empty() || !overlaps_.empty()),
@@ -225,7 +228,9 @@ class EmbreeTracer final : public RayTracer {
     errors_.check();
     rtcSetSceneFlags(rtc_scene_.get(),
                      static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | kFilterOfQuery));
-    rtcSetSceneBuildQuality(rtc_scene_.get(), RTC_BUILD_QUALITY_HIGH);
+    // What serves one time alone must be built soon.
+    rtcSetSceneBuildQuality(rtc_scene_.get(),
+                            is_moving(scene) ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH);
     for (size_t i = 0; i < scene.shapes.size(); ++i)
       attach(scene.shapes[i].mesh, ShapeId(static_cast<uint32_t>(i)));
     // On the threads of this call alone.
@@ -270,6 +275,7 @@ class EmbreeTracer final : public RayTracer {
   }
 
  private:
+  static bool has_none(const Scene& scene) { return scene.exposure && scene.exposure->no_overlaps; }
   // True if a coplanar or near face of the ray's end, or a near face of its start, occludes it.
   bool is_hidden_by_near(const Ray& ray) const {
     if (ray.end.shape.valid() &&

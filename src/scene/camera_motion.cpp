@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "limn/core/exposure.h"
 #include "src/scene/motion.h"
 #include "src/scene/motion_lists.h"
 
@@ -16,9 +17,11 @@ class CameraTranslation final : public Motion {
   Moved moved() const override { return {.camera = true}; }
   void seed(Scene& scene, int lane, size_t) const override {
     scene.camera.origin[axis_].d[lane] += 1;
+    if (Course* course = course_of(scene)) course->shift[axis_][lane] += 1;
   }
   void move(Scene& scene, double step, size_t) const override {
     scene.camera.origin[axis_].v += step;
+    if (Course* course = course_of(scene)) course->translate(unit_vector(axis_) * step);
   }
   std::vector<double> numbers(const Scene& scene) const override {
     return {scene.camera.origin[axis_].v};
@@ -26,10 +29,15 @@ class CameraTranslation final : public Motion {
   void assign(Scene& scene, const std::string& name, const std::vector<double>& value,
               std::vector<std::string>*) const override {
     check_numbers(scene, name, value, 1, -kLargestCoordinate, kLargestCoordinate);
+    move(scene, value[0] - scene.camera.origin[axis_].v, 0);
     scene.camera.origin[axis_].v = value[0];
   }
 
  private:
+  // Which moves as a whole.
+  static Course* course_of(Scene& scene) {
+    return scene.exposure ? &own_exposure(scene).cameras[scene.sensor] : nullptr;
+  }
   int axis_;
 };
 

@@ -42,6 +42,7 @@ bool has_texel_borders(const Scene& scene) {
 void add_moving_parameters(const Scene& scene, std::vector<Parameter>& list) {
   add_shape_parameters(scene, list);
   add_camera_parameters(scene, list);
+  add_course_parameters(scene, list);
 }
 
 void check_nothing_moves(const Scene& scene, const std::string& name) {

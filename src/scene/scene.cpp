@@ -1,6 +1,7 @@
 // Deep copies of scenes, and the choice of a sensor.
 #include "limn/core/scene.h"
 
+#include "limn/core/exposure.h"
 #include "limn/core/mesh_attribute.h"
 #include "limn/core/set_shading.h"
 
@@ -57,6 +58,7 @@ Scene deep_copy(const Scene& scene) {
   for (auto& [id, bsdf] : copy.bsdfs_by_id) bsdf = copy_once(bsdf, copies);
   if (scene.environment) copy.environment = scene.environment->clone();
   for (auto& light : copy.delta_lights) light = light->clone();
+  if (scene.exposure) copy.exposure = std::make_shared<Exposure>(*scene.exposure);
   return copy;
 }
 

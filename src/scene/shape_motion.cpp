@@ -4,6 +4,7 @@
 
 #include "limn/core/check.h"
 #include "limn/core/displacement.h"
+#include "limn/core/exposure.h"
 #include "src/base/text.h"
 #include "src/mesh/shading_tangents.h"
 #include "src/scene/motion.h"
@@ -35,11 +36,17 @@ class ShapeMotion : public Motion {
     add_to_lane(mesh.position_tangents, lane, vertex_velocities(mesh, component));
     if (mesh.normal_source == NormalSource::kGiven) seed_given_normals(mesh, lane);
     update_shading_tangents(mesh);
+    const Vec3d shift = own_pose_per_unit().moved;
+    if (Course* course = course_of(scene, shift)) {
+      for (int k = 0; k < 3; ++k) course->shift[k][lane] += shift[k];
+    }
   }
   void move(Scene& scene, double step, size_t component) const final {
     Mesh& mesh = scene.shapes[shape_.index()].mesh;
     move_vertices(mesh, step, component);
     update_shading_normals(mesh);
+    const Vec3d shift = own_pose_per_unit().moved;
+    if (Course* course = course_of(scene, shift)) course->translate(shift * step);
   }
   std::vector<Vec3d> velocities(const Scene& scene, ShapeId shape, size_t component) const final {
     if (shape != shape_) return {};
@@ -61,6 +68,12 @@ class ShapeMotion : public Motion {
   }
 
  private:
+  // That a shift moves as a whole; what else moves a shape is carried along.
+  Course* course_of(Scene& scene, const Vec3d& shift) const {
+    if (!scene.exposure || shift == Vec3d{}) return nullptr;
+    return &own_exposure(scene).shapes[shape_.index()];
+  }
+
   ShapeId shape_;
 };
 

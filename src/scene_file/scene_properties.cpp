@@ -146,6 +146,11 @@ Matrix4 DescribedProperties::transform(const std::string& name) {
   fail_type(name, *p, "<transform>");
 }
 
+const Animation* DescribedProperties::animation(const std::string& name) {
+  const DescribedProperty* p = find(name);
+  return p ? std::get_if<Animation>(&p->value) : nullptr;
+}
+
 std::string DescribedProperties::file(const std::string& name) {
   const DescribedProperty* p = find(name);
   if (!p) fail("parameter \"" + name + "\" is missing");

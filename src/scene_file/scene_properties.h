@@ -45,6 +45,9 @@ class DescribedProperties final : public Properties {
   std::vector<std::shared_ptr<Bsdf>> bsdfs() override;
   double smooth_as() const override { return make_nested_.smooth_as; }
 
+  // Null if the property is absent or has another type.
+  const Animation* animation(const std::string& name);
+
   // The nested object of this tag; null if there is none, InputError if there are several or if it
   // failed.
   const ObjectDescription* nested(const std::string& tag);

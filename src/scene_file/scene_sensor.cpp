@@ -8,6 +8,7 @@
 #include "limn/core/memory.h"
 #include "limn/core/names.h"
 #include "src/base/text.h"
+#include "src/scene_file/scene_course.h"
 
 namespace limn {
 
@@ -253,7 +254,8 @@ void read_lens(Properties& p, Camera& camera) {
 }  // namespace
 
 Sensor read_sensor(const ObjectDescription& sensor, const SceneDescription& description,
-                   std::vector<std::string>& warnings, const SharedParts& shared) {
+                   Exposure& exposure, std::vector<std::string>& warnings,
+                   const SharedParts& shared) {
   Sensor read;
   read.id = sensor.id;
   const bool orthographic = sensor.type == "orthographic";
@@ -271,7 +273,12 @@ Sensor read_sensor(const ObjectDescription& sensor, const SceneDescription& desc
   const ObjectDescription* sampler = p.nested("sampler");
   if (!sampler) sampler = shared.sampler;
   if (sampler) read_sampler(*sampler, description, read, warnings);
-  Matrix4 to_world = p.transform("to_world");
+  Course& course = exposure.cameras.emplace_back();
+  exposure.shutters.push_back(read_shutter(p));
+  Matrix4 to_world = read_course(p, exposure.reference, course);
+  for (const Keyframe& key : course.keyframes) {
+    if (key.scale != 1) p.fail("to_world", "a camera can be moved and rotated, not scaled");
+  }
   Vec3d size{1, 1, 1};
   if (orthographic) {
     size = normalize_axes(to_world);
@@ -291,10 +298,7 @@ Sensor read_sensor(const ObjectDescription& sensor, const SceneDescription& desc
     camera.offset_y = p.number("principal_point_offset_y", 0);
   }
   if (lens) read_lens(p, camera);
-  // Accepted and ignored: nothing moves during an exposure, and only a lens has a focus. They have
-  // no effect in Mitsuba either.
-  p.number("shutter_open", 0);
-  p.number("shutter_close", 0);
+  // Accepted and ignored: only a lens has a focus.
   p.number("focus_distance", camera.far_clip);
   p.check_all_used();
   return read;

@@ -1,5 +1,6 @@
 #pragma once
 // Sensor, film, reconstruction filter and sampler of a scene file.
+#include "limn/core/exposure.h"
 #include "limn/core/scene.h"
 #include "src/scene_file/scene_properties.h"
 
@@ -14,8 +15,9 @@ struct SharedParts {
 };
 
 // Reads a sensor with its film, filter and sampler.
-// Appends whole lines to `warnings`.
+// Appends its shutter and its course to `exposure`, and whole lines to `warnings`.
 Sensor read_sensor(const ObjectDescription& sensor, const SceneDescription& description,
-                   std::vector<std::string>& warnings, const SharedParts& shared = {});
+                   Exposure& exposure, std::vector<std::string>& warnings,
+                   const SharedParts& shared = {});
 
 }  // namespace limn

@@ -175,8 +175,7 @@ const std::map<std::string, MatrixParser>& transform_operations() {
   return operations;
 }
 
-PropertyValue parse_transform(const XmlElement& e) {
-  check_attributes(e, {"name"}, {"name"});
+Matrix4 transform_in(const XmlElement& e) {
   Matrix4 result;
   for (const XmlElement& child : e.children) {
     const auto operation = transform_operations().find(child.name);
@@ -192,6 +191,30 @@ PropertyValue parse_transform(const XmlElement& e) {
     result = operation->second(child) * result;
   }
   return result;
+}
+
+PropertyValue parse_transform(const XmlElement& e) {
+  check_attributes(e, {"name"}, {"name"});
+  return transform_in(e);
+}
+
+PropertyValue parse_animation(const XmlElement& e) {
+  check_attributes(e, {"name"}, {"name"});
+  Animation animation;
+  for (const XmlElement& child : e.children) {
+    if (child.name != "transform") {
+      throw InputError(child.where,
+                       "<animation>: takes <transform time=\"...\">, not <" + child.name + ">");
+    }
+    check_attributes(child, {"time"}, {"time"});
+    const XmlAttribute& time = *child.find("time");
+    animation.push_back({parse_number(child, time), transform_in(child), child.where});
+    if (animation.size() > 1 && !(animation.back().time > animation.end()[-2].time)) {
+      throw InputError(time.where, "<animation>: its times must grow");
+    }
+  }
+  if (animation.empty()) throw InputError(e.where, "<animation>: needs a <transform>");
+  return animation;
 }
 
 const XmlAttribute& value_of(const XmlElement& e) {
@@ -246,15 +269,12 @@ PropertyValue parse_spectrum(const XmlElement& e) {
 using PropertyParser = PropertyValue (*)(const XmlElement&);
 
 const std::map<std::string, PropertyParser>& property_parsers() {
-  static const std::map<std::string, PropertyParser> parsers = {{"boolean", parse_boolean},
-                                                                {"float", parse_float},
-                                                                {"integer", parse_integer_property},
-                                                                {"point", parse_point},
-                                                                {"rgb", parse_rgb},
-                                                                {"spectrum", parse_spectrum},
-                                                                {"string", parse_string},
-                                                                {"transform", parse_transform},
-                                                                {"vector", parse_point}};
+  static const std::map<std::string, PropertyParser> parsers = {
+      {"animation", parse_animation}, {"boolean", parse_boolean},
+      {"float", parse_float},         {"integer", parse_integer_property},
+      {"point", parse_point},         {"rgb", parse_rgb},
+      {"spectrum", parse_spectrum},   {"string", parse_string},
+      {"transform", parse_transform}, {"vector", parse_point}};
   return parsers;
 }
 
@@ -272,7 +292,7 @@ const std::vector<std::string>& property_tags() {
 bool is_property_tag(const std::string& tag) { return property_parsers().count(tag) > 0; }
 
 PropertyValue parse_property(const XmlElement& element) {
-  if (element.name != "transform" && !element.children.empty()) {
+  if (element.name != "transform" && element.name != "animation" && !element.children.empty()) {
     throw InputError(element.children[0].where, "<" + element.name + "> takes no elements");
   }
   return property_parsers().at(element.name)(element);

@@ -17,8 +17,16 @@ struct SpectrumValue {
   std::string filename;
 };
 
-using PropertyValue =
-    std::variant<bool, int64_t, double, std::string, Vec3d, Rgb<double>, SpectrumValue, Matrix4>;
+// <animation>: transforms at times, which grow.
+struct TimedTransform {
+  double time;
+  Matrix4 transform;
+  SourceLocation where;
+};
+using Animation = std::vector<TimedTransform>;
+
+using PropertyValue = std::variant<bool, int64_t, double, std::string, Vec3d, Rgb<double>,
+                                   SpectrumValue, Matrix4, Animation>;
 
 // Names of the property tags: boolean, integer, ...
 const std::vector<std::string>& property_tags();

@@ -18,6 +18,7 @@
 #include "src/mesh/mesh_file.h"
 #include "src/mesh/shapes.h"
 #include "src/scene_file/integrators.h"
+#include "src/scene_file/scene_course.h"
 #include "src/scene_file/scene_properties.h"
 #include "src/scene_file/scene_sensor.h"
 
@@ -40,10 +41,12 @@ class SceneBuilder {
     scene_.file = description_.file;
     scene_.xml_files = description_.files;
     scene_.smooth_as = make_nested_.smooth_as;
+    exposure_.reference = reference_time(description_);
     warnings_.insert(warnings_.end(), description_.warnings.begin(), description_.warnings.end());
     for (const auto& object : description_.objects) {
       if (object->failed) make_bsdfs_in(*object);
       instance_ = {};
+      in_instance_ = false;
       errors_.keep([&] {
         read_once(*object, [&] {
           add(*object);
@@ -60,6 +63,7 @@ class SceneBuilder {
       throw InputError(description_.where, "<scene>: there is no sensor");
     }
     use_sensor(scene_, "0");
+    add_exposure();
     if (&warnings_ != &unread_warnings_) warn_of_overlaps(scene_, warnings_);
     return std::move(scene_);
   }
@@ -91,7 +95,7 @@ class SceneBuilder {
     } else if (object.tag == "sensor" && object.type == "batch") {
       add_batch(object);
     } else if (object.tag == "sensor") {
-      scene_.sensors.push_back(read_sensor(object, description_, warnings_));
+      scene_.sensors.push_back(read_sensor(object, description_, exposure_, warnings_));
     } else if (object.tag == "shape" && object.type == "shapegroup") {
       check_group(object);
     } else if (object.tag == "shape" && object.type == "instance") {
@@ -125,7 +129,7 @@ class SceneBuilder {
     if (sensors.empty()) p.fail("needs sensors");
     for (const ObjectDescription* sensor : sensors) {
       if (sensor->type == "batch") p.fail("takes no batch");
-      scene_.sensors.push_back(read_sensor(*sensor, description_, warnings_, shared));
+      scene_.sensors.push_back(read_sensor(*sensor, description_, exposure_, warnings_, shared));
     }
   }
 
@@ -223,7 +227,12 @@ class SceneBuilder {
 
   MeshOptions read_mesh_options(DescribedProperties& p, bool from_file) {
     MeshOptions options;
-    options.to_world = instance_ * p.transform("to_world");
+    Course own;
+    options.to_world = instance_ * read_course(p, exposure_.reference, own);
+    if (!own.keyframes.empty() && in_instance_) {
+      p.fail("to_world", "shapes of a group move with their instance: animate that");
+    }
+    if (!in_instance_) course_ = std::move(own);
     try {
       options.to_world.inverse();
     } catch (const std::domain_error&) {
@@ -364,12 +373,14 @@ class SceneBuilder {
   // Copies the shapes of a group. Those of its second instance have ids that end in ".2", ...
   void add_instance(const ObjectDescription& object) {
     DescribedProperties p(object, description_, make_nested_);
-    const Matrix4 to_world = p.transform("to_world");
+    course_ = {};
+    const Matrix4 to_world = read_course(p, exposure_.reference, course_);
     const std::vector<const ObjectDescription*> groups = p.all_nested("shape");
     p.check_all_used();
     if (groups.size() != 1 || groups[0]->type != "shapegroup") p.fail("needs one shapegroup");
     const int number = ++instances_[groups[0]];
     instance_ = to_world;
+    in_instance_ = true;
     for (const ObjectDescription* shape : check_group(*groups[0])) {
       const std::string suffix = number == 1 ? "" : "." + std::to_string(number);
       read_once(*shape, [&] { add_shape(*shape, shape->id + suffix); });
@@ -380,6 +391,18 @@ class SceneBuilder {
       }
     }
     instance_ = {};
+    in_instance_ = false;
+  }
+
+  // Where something may move. Shapes turn about the centers of their bounds.
+  void add_exposure() {
+    const double still = exposure_.reference;
+    const auto closed = [&](const Shutter& s) { return s.open.v == still && s.close.v == still; };
+    if (std::ranges::all_of(exposure_.shutters, closed)) return;
+    for (size_t s = 0; s < scene_.shapes.size(); ++s) {
+      exposure_.shapes[s].center = bounds_of(scene_.shapes[s].mesh).center();
+    }
+    scene_.exposure = std::make_shared<Exposure>(std::move(exposure_));
   }
 
   // The textures of a shape, by what they give.
@@ -503,6 +526,7 @@ class SceneBuilder {
     check_attributes(shape);
     if (shape.radiance_texture) set_mean_radiance(shape);
     scene_.shapes.push_back(std::move(shape));
+    exposure_.shapes.push_back(course_);
   }
 
   const SceneDescription& description_;
@@ -516,6 +540,9 @@ class SceneBuilder {
   int bsdf_depth_ = 0;
   static constexpr size_t kMostInstancedFaces = 10000000;  // not tuned
   Matrix4 instance_;                                       // of the shapes that are added
+  bool in_instance_ = false;
+  Course course_;  // of the shape or the instance that is added
+  Exposure exposure_;
   std::map<const ObjectDescription*, int> instances_;
   size_t instanced_faces_ = 0;
   double unasked_ = 0;  // bytes of shapes since the last check

@@ -11,8 +11,14 @@
 //   SHAPE.displacement            scene units: an array, how far each of its V vertices goes along
 //                                 its normal (displacement.h)
 //   SHAPE.displacement.V          one of them: vertex V (from 0) with its copies
+//   SHAPE.velocity.x|y|z          scene units per unit of time, where a shutter stays open: what is
+//                                 added to its course (exposure.h)
+//   SHAPE.spin.x|y|z              radians per unit of time, the same, about its center
 //   sensor.translate.x|y|z        scene units
 //   sensor.rotate.x|y|z           radians, world axes through the pinhole
+//   sensor.velocity.x|y|z         as of shapes
+//   sensor.spin.x|y|z             as of shapes, about the pinhole
+//   sensor.shutter_open|close     units of time
 //   sensor.fov                    degrees
 //   sensor.aperture_radius        scene units, of a sensor with a lens
 //   sensor.focus_distance         scene units, the same

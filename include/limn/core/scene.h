@@ -23,6 +23,8 @@ enum class ShadingModel {
   kMitsuba,     // Mitsuba 3's convention, to compare images; gradients miss its discontinuities
 };
 
+struct Exposure;  // exposure.h
+
 struct Shape {
   std::string id;  // "" if the file gives none
   SourceLocation where;
@@ -59,6 +61,9 @@ struct Scene {
   // is selected by default.
   std::vector<Sensor> sensors;
   size_t sensor = 0;  // index of the selected one
+  // How things move while a shutter is open; null where none is open for a while. The scene itself
+  // is as it is at the exposure's reference time.
+  std::shared_ptr<Exposure> exposure;
   ShadingModel shading = ShadingModel::kContinuous;
   double smooth_as = 0;  // the roughness that smooth lobes were read with; 0: they are smooth
 

@@ -1,0 +1,76 @@
+#pragma once
+// How shapes and cameras move while a shutter is open. Samples of an image have times, uniform
+// between the shutter's opening and its closing.
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "limn/core/dual.h"
+#include "limn/core/matrix.h"
+#include "limn/core/scene.h"
+
+namespace limn {
+
+struct CoincidentFaces;  // coincident_faces.h
+
+struct Keyframe {
+  double time = 0;
+  Vec3d place;       // of the object's origin, world space
+  Matrix4 rotation;  // of the object since the first keyframe
+  double scale = 1;  // the same
+  Vec3d turn = {};   // a rotation vector: from here to the next keyframe, the short way
+};
+
+// The motion of a shape or a camera: by keyframes as in Mitsuba 3 (place and scale are linear in
+// time between two, rotations turn at a constant rate, and all is constant before the first and
+// after the last); beside that by a velocity and a spin about the center, which are still at the
+// exposure's reference time.
+struct Course {
+  std::vector<Keyframe> keyframes;  // in order; none: still
+  Vec3d center;                     // at the reference time, world space
+  Vec3<Dual> velocity;              // scene units per unit of time
+  Vec3<Dual> spin;                  // radians per unit of time, world axes
+  Vec3<Lanes> shift;                // derivatives of the place of the whole course
+
+  bool moves() const;
+  void translate(const Vec3d& by);
+  // From the first keyframe to a time.
+  Matrix4 since_first(double time) const;
+};
+
+struct Shutter {
+  Dual open = 0, close = 0;
+};
+
+struct Exposure {
+  double reference = 0;           // the middle of the first sensor's shutter, as in the file
+  std::vector<Shutter> shutters;  // of each sensor
+  std::vector<Course> cameras;    // of each sensor
+  std::vector<Course> shapes;     // of each shape
+  // None, where that is known of the scene; else null.
+  std::shared_ptr<const CoincidentFaces> no_overlaps;
+};
+
+// Whether images of the scene are means over times: something moves while the sensor's shutter is
+// open.
+bool is_moving(const Scene& scene);
+// InputError if it is: `what` cannot take it.
+void check_still(const Scene& scene, const std::string& what);
+
+// The scene as it is at a time, the fraction u of the way from opening to closing, with the
+// derivatives that its exposure, vertices and camera have been seeded with. It shares BSDFs,
+// textures and lights with the scene.
+Scene at_time(const Scene& scene, double u);
+// The same in place: from the reference time, once.
+void set_time(Scene& scene, double u);
+// Looks once whether faces coincide. If none does, at_time() knows the same of all times when what
+// moves is away from all else. The scene must stay where it is meanwhile.
+void find_overlaps(Scene& scene, int threads);
+// Takes the derivative by a shape's vertex at the time u to that by the vertex at the reference
+// time.
+Matrix4 pulls_back(const Scene& scene, ShapeId shape, double u);
+
+// To be changed: no other scene shares it afterwards. The scene must have an exposure.
+Exposure& own_exposure(Scene& scene);
+
+}  // namespace limn
