@@ -146,8 +146,19 @@ TEST(FilmMotion, KeepsTheMean) {
   }
 }
 
-// Where the camera sees edges by way of a mirror, positions move but directions of the floor, which
-// sees them, too, do not.
+// What vertices see by way of mirrors moves with no direction.
+TEST(FilmMotion, HoldsDirectionsThatSeeMirrors) {
+  const Scene scene =
+      read_scene(LIMN_SOURCE_DIR "/scenes/closed_form/lamp_in_corner.xml", {}, nullptr);
+  const std::string name = "floor.rotate.x";
+  const GradientResult held = run_method(scene, {name}, "forest", 1 << 14, 1);
+  const GradientResult asked =
+      run_method(scene, {name}, "silhouettes:directions=random", 1 << 14, 2);
+  const Moments &a = held.parameters[0].total, &b = asked.parameters[0].total;
+  EXPECT_LT(std::fabs(a.mean(0) - b.mean(0)), 5 * std::sqrt(a.variance(0) + b.variance(0)));
+}
+
+// Where the camera sees edges by way of a mirror, positions move.
 TEST(FilmMotion, KeepsTheMeanBeforeAMirror) {
   const TempFiles files;
   const Scene scene = scene_with(files, kFilters[1], 8, true);
