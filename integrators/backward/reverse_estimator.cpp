@@ -79,7 +79,6 @@ void ReverseEstimator::describe(BackwardResult& result) const {
   if (!moved_.any()) return;
   warn_of_contacts(scene(), input_.made_edges(), result.warnings);
   warn_of_faces_edge_on(scene(), *traced_.context().viewpoints, result.warnings);
-  warn_of_shadows_on_lifted_points(scene(), result.warnings);
   check_texture_edges(scene(), result.warnings);
   const std::string missing =
       missing_by_chains(traced_.context(), scene(), parameters_.parameters());

@@ -150,16 +150,4 @@ void warn_of_contacts(const Scene& scene, const EdgeSamplerInput* edges,
     warn(fmt::format("{} more pairs of shapes touch and part like that", told - kMost));
 }
 
-void warn_of_shadows_on_lifted_points(const Scene& scene, std::vector<std::string>& warnings) {
-  if (scene.delta_lights.empty()) return;
-  for (uint32_t i = 0; i < scene.shapes.size(); ++i) {
-    if (!is_lifted(scene, ShapeId(i))) continue;
-    warnings.push_back(fmt::format(
-        "the derivative of hard shadows on {} is incomplete: its normals are interpolated, and "
-        "shadows that its own faces cast in hollows and at its terminator are not differentiated; "
-        "a finer mesh or area lights make the missing part smaller",
-        quoted_name(scene, ShapeId(i))));
-  }
-}
-
 }  // namespace limn

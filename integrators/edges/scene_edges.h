@@ -20,8 +20,5 @@ void add_light(const Scene& scene, EdgeSamplerInput& input);
 // twice. edges: of the scene, in motion; null: none.
 void warn_of_contacts(const Scene& scene, const EdgeSamplerInput* edges,
                       std::vector<std::string>& warnings);
-// One for each shape with interpolated normals on which hard shadows fall: silhouettes as delta
-// lights see them are not all that parts light from shadow on points that are lifted from faces.
-void warn_of_shadows_on_lifted_points(const Scene& scene, std::vector<std::string>& warnings);
 
 }  // namespace limn

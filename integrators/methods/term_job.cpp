@@ -177,7 +177,6 @@ class TermJob {
     const std::string missing = missing_by_chains(pass(0).context(), scene_, parameters_);
     result.incomplete = !missing.empty();
     if (result.incomplete) result.warnings.push_back(missing);
-    if (moved_.any()) warn_of_shadows_on_lifted_points(scene_, result.warnings);
     if (moved_.any()) check_texture_edges(scene_, result.warnings);
     bool told = false;
     for (size_t p = 0; p < passes_.size(); ++p) {

@@ -1,15 +1,14 @@
 // Lifted points of a face are a piecewise quadratic patch, which a line may meet several times.
 //
-// As the line sees it, the patch is a map of the triangle to the plane, and crossings are its zeros.
+// As the line sees it, the patch maps the triangle to a plane, and crossings are zeros of the map.
 // Where the gains of surface_lift.h stay the same it is F(b) = sum of b_i b_j q_ij, so that
-// F(a) - F(b) = J((a + b) / 2) (a - b): where det J has one sign over a triangle there is at most one
-// zero. Triangles are split in four until Newton's method finds that one, or zero lies outside of
-// the hull of the q_ij.
+// F(a) - F(b) = J((a + b) / 2) (a - b): where det J has one sign over a triangle there is at most
+// one zero. Triangles are split in four until Newton's method finds that one, or zero lies outside
+// of the hull of the q_ij.
 #include "integrators/terms/lifted_faces.h"
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <optional>
 
 #include "limn/core/surface_point.h"

@@ -313,6 +313,40 @@ INSTANTIATE_TEST_SUITE_P(
       return name;
     });
 
+// Hard shadows that a coarse mesh casts on itself, where light grazes it: differences and what they
+// change by from one step to the next, which bounds their bias, leave room for half a percent.
+TEST(LiftedPoints, GrazingLightHasAllItsShadows) {
+  const TempFiles files;
+  SceneParts parts;
+  parts.max_depth = 2;
+  parts.origin = {1.5, -2, 3.5};
+  parts.target = {0, 0, 0};
+  parts.fov = 30;
+  parts.body = obj_shape("body", write_mesh(files, "waves.obj", waves_mesh()), false, 1, {},
+                         diffuse("clay", "0.5, 0.5, 0.5")) +
+               R"(<emitter type="point" id="bulb"><point name="position" value="2.5,0.4,0.8"/>
+                  <rgb name="intensity" value="14,14,14"/></emitter>)";
+  const Scene scene = make_scene(files, parts);
+  RunSettings settings;
+  settings.spp = 8192;
+  const DifferenceResult differences =
+      finite_differences(scene, "bulb.translate.z", 0.02, 8, settings);
+  const Moments &fine = differences.at_step.image_sum,
+                &coarse = differences.at_double_step.image_sum;
+  settings.spp = 256;
+  settings.seed = 2;
+  GradientOptions options;
+  options.parameters = {"bulb.translate.z"};
+  const GradientResult result = gradient(scene, options, settings);
+  const Moments& sum = result.parameters[0].image_sum;
+  const double error = std::sqrt(fine.variance(0) + sum.variance(0));
+  EXPECT_LT(3 * error, 0.006 * sum.mean(0));
+  printf("%g %g %g +- %g %g; %g +- %g\n", coarse.mean(0), fine.mean(0), differences.extrapolated.image_sum.mean(0), std::sqrt(fine.variance(0)), std::sqrt(differences.extrapolated.image_sum.variance(0)), sum.mean(0), std::sqrt(sum.variance(0)));
+  const double room = std::fabs(coarse.mean(0) - fine.mean(0)) + 3 * error;
+  EXPECT_LT(room, 0.01 * sum.mean(0));
+  EXPECT_NEAR(sum.mean(0), fine.mean(0), room);
+}
+
 // Light in closed form, and lines and regions of the sky, from where paths start, too: the sums of
 // images agree.
 TEST(LiftedPoints, MethodsShareAnImage) {

@@ -43,9 +43,9 @@ struct Grid {
   static int index(int i, int j) { return i * (kCells + 1) - i * (i - 1) / 2 + j; }
 };
 
-// Points of the face over which the line along frame.n through y passes fine triangles behind y. Not
-// where triangles nearby turn the other way, as the line sees them: zeros vanish in pairs at such a
-// fold, and triangles say only about where.
+// Points of the face over which the line along frame.n through y passes fine triangles behind y.
+// Not where triangles nearby turn the other way, as the line sees them: zeros vanish in pairs at
+// such a fold, and triangles say only about where.
 std::vector<Vec3d> pierced(const Grid& grid, const Vec3d& y, const Frame& frame) {
   constexpr int kFold = 5;
   std::vector<Vec3d> seen, found;
