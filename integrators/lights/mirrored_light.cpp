@@ -136,7 +136,8 @@ std::unique_ptr<MirroredLight> MirroredLight::make(const Scene& scene, const Lig
     return bsdf && bsdf->lobe().model->width(bsdf->lobe()) < kWidest;
   };
   const auto may_mirror = [&](const Shape& shape) {
-    return narrow(shape.bsdf->side(true)) || narrow(shape.bsdf->side(false));
+    return shape.mesh.faces.size() <= kMostFaces &&  // others have no flat_parts()
+           (narrow(shape.bsdf->side(true)) || narrow(shape.bsdf->side(false)));
   };
   if (scene.max_depth == 1 || scene.max_depth == 2 ||
       std::none_of(scene.shapes.begin(), scene.shapes.end(), may_mirror)) {

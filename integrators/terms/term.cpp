@@ -59,11 +59,6 @@ const EdgeSamplerInput& TermInput::edges() {
     regions_ = std::make_unique<LightRegions>(context.scene);
     if (regions_->empty()) regions_.reset();
   }
-  if (regions_) {
-    regions_->add_rest(*edges_);
-  } else {
-    add_light(context.scene, *edges_);
-  }
   edges_seconds_ = watch.seconds();
   return *edges_;
 }
@@ -93,8 +88,14 @@ const EmitterEdges* TermInput::emitter_edges() {
 
 const EdgeSampler& TermInput::edge_sampler() {
   if (edge_sampler_) return *edge_sampler_;
-  const EdgeSamplerInput& input = chosen_edges();
+  chosen_edges();
   const Stopwatch watch;
+  EdgeSamplerInput& input = warps ? *unfollowed_ : *edges_;
+  if (regions_) {
+    regions_->add_rest(input);
+  } else {
+    add_light(context.scene, input);
+  }
   edge_sampler_ = sampler.make(input, threads);
   edge_sampler_seconds_ = watch.seconds();
   return *edge_sampler_;

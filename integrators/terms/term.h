@@ -131,8 +131,9 @@ class TermInput {
   // In reverse mode: what may move, each vertex by itself. Else null.
   const FreeMotion* free = nullptr;
 
-  // Edges of all shapes (object i is shape i), light polygons and the environment, as an edge
-  // sampler takes them; without the regions of light. Made when a term first asks.
+  // Edges of all shapes (object i is shape i), as an edge sampler takes them; light polygons and
+  // the environment, without the regions of light, once edge_sampler() was asked. Made when a term
+  // first asks.
   const EdgeSamplerInput& edges();
   // The regions of light; null if the sampler has none apart, or the scene has none.
   const LightRegions* regions();
