@@ -124,7 +124,7 @@ std::vector<std::string> trace_backward(const Scene& scene, const Image& adjoint
                                         const BackwardOptions& options, const RunSettings& settings,
                                         const NonFinite::SampleId& place) {
   check(options);
-  check_still(scene, "a look at one sample");
+  check_still(scene, "the trace of one sample (debug-sample)");
   SampleLog log;
   const auto trace = [&](const auto& estimator) {
     for (const Parameter& p : estimator.parameters().parameters()) {

@@ -56,8 +56,8 @@ void check_scene_and_memory(const Scene& scene, int spp, int lines) {
                                                scene.max_depth));
   }
   for (const auto& light : scene.delta_lights) {
-    throw InputError({scene.file}, fmt::format("bake: {}: views are of light from shapes and "
-                                               "the map alone: remove it",
+    throw InputError({scene.file}, fmt::format("bake: {}: only area lights and the "
+                                               "environment map are supported: remove it",
                                                quoted_name("emitter", light->id)));
   }
   for (const Shape& shape : scene.shapes) {
@@ -65,7 +65,7 @@ void check_scene_and_memory(const Scene& scene, int spp, int lines) {
       const Bsdf* const side = shape.bsdf->side(front);
       if (!side || side->is_lambertian()) continue;
       throw InputError(shape.where,
-                       fmt::format("bake: {}: only diffuse surfaces without textures are baked, "
+                       fmt::format("bake: {}: only untextured diffuse surfaces are supported, "
                                    "this is {}: make it diffuse, or render under each map",
                                    shape_in_text(shape), side->describe()));
     }

@@ -194,7 +194,7 @@ std::vector<std::string> trace_sample(const Scene& scene, const RunSettings& set
     return trace_sample(with_direct_light_alone(scene), settings, place, of_radiance(options));
   }
   check_pixel(scene.film, place);
-  check_still(scene, "a look at one sample");
+  check_still(scene, "the trace of one sample (debug-sample)");
   const auto estimator = make_estimator(scene, settings, options);
   SampleLog log;
   run_pixel_sample(*estimator, settings.seed, {place.x, place.y, place.sample}, log);

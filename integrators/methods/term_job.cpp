@@ -124,7 +124,7 @@ class TermJob {
   }
 
   std::vector<std::string> trace(const RunSettings& settings, const NonFinite::SampleId& place) {
-    check_still(scene_, "a look at one sample");
+    check_still(scene_, "the trace of one sample (debug-sample)");
     GradientResult unused = empty_result();
     const Stopwatch watch;
     plan(settings, watch, unused);

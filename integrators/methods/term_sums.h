@@ -1,5 +1,5 @@
 #pragma once
-// What batches of terms add up to.
+// Sums of batches, as moments of parameters.
 #include <algorithm>
 #include <vector>
 

@@ -61,13 +61,13 @@ std::string read_whole_file(const std::string& file) {
   std::error_code error;
   const uintmax_t size = std::filesystem::file_size(file, error);
   if (error) fail(error.message());
-  if (!std::filesystem::is_regular_file(file)) fail("it is no regular file");
+  if (!std::filesystem::is_regular_file(file)) fail("it is not a regular file");
   std::ifstream stream(file, std::ios::binary);
   if (!stream) fail(std::strerror(errno));
   require_memory({file}, static_cast<double>(size), "the file", "split it");
   std::string content(size, '\0');
   stream.read(content.data(), static_cast<std::streamsize>(size));
-  if (static_cast<uintmax_t>(stream.gcount()) != size) fail("it ends early");
+  if (static_cast<uintmax_t>(stream.gcount()) != size) fail("it ended while it was read");
   return content;
 }
 

@@ -202,8 +202,8 @@ void check_light(const Mesh& mesh, const SourceLocation& where,
   const double lost = warnings ? lost_light(mesh) : 0;
   if (lost <= kMost) return;
   warn(warnings, where,
-       fmt::format("flat faces hide {:.2g} % of a uniform light from the smooth surface that the "
-                   "normals mean (in its hollows): a finer mesh or face_normals loses less",
+       fmt::format("faces block {:.2g} % of uniform light from the smooth surface that their "
+                   "normals describe (in concave parts): use a finer mesh or face_normals",
                    100 * lost));
 }
 

@@ -53,8 +53,8 @@ void check_nothing_moves(const Scene& scene, const std::string& name) {
       continue;
     }
     throw InputError({scene.file}, "parameter \"" + name +
-                                       "\": texels' borders would move unseen, of the "
-                                       "nearest bitmap of a light or bumpmap: use bilinear");
+                                       "\": no term covers texel borders of a nearest "
+                                       "bitmap of a light or bumpmap: use bilinear");
   }
 }
 

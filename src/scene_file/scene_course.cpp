@@ -80,8 +80,7 @@ Matrix4 read_course(DescribedProperties& p, double time, Course& course) {
   try {
     inverse = first.inverse();
   } catch (const std::domain_error&) {
-    throw InputError(animation->front().where,
-                     "<animation>: the transform is not invertible: it flattens the shape");
+    throw InputError(animation->front().where, "<animation>: the transform is not invertible");
   }
   for (const TimedTransform& at : *animation) course.keyframes.push_back(keyframe(at, inverse));
   for (size_t k = 0; k + 1 < course.keyframes.size(); ++k) {

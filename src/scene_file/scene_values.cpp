@@ -210,7 +210,7 @@ PropertyValue parse_animation(const XmlElement& e) {
     const XmlAttribute& time = *child.find("time");
     animation.push_back({parse_number(child, time), transform_in(child), child.where});
     if (animation.size() > 1 && !(animation.back().time > animation.end()[-2].time)) {
-      throw InputError(time.where, "<animation>: its times must grow");
+      throw InputError(time.where, "<animation>: times must increase");
     }
   }
   if (animation.empty()) throw InputError(e.where, "<animation>: needs a <transform>");

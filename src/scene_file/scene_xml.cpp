@@ -128,7 +128,7 @@ class SceneBuilder {
     p.check_all_used();
     if (sensors.empty()) p.fail("needs sensors");
     for (const ObjectDescription* sensor : sensors) {
-      if (sensor->type == "batch") p.fail("takes no batch");
+      if (sensor->type == "batch") p.fail("a batch cannot contain a batch");
       scene_.sensors.push_back(read_sensor(*sensor, description_, exposure_, warnings_, shared));
     }
   }
@@ -230,7 +230,7 @@ class SceneBuilder {
     Course own;
     options.to_world = instance_ * read_course(p, exposure_.reference, own);
     if (!own.keyframes.empty() && in_instance_) {
-      p.fail("to_world", "shapes of a group move with their instance: animate that");
+      p.fail("to_world", "shapes of a group move with their instance: put the animation there");
     }
     if (!in_instance_) course_ = std::move(own);
     try {

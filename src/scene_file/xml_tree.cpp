@@ -139,7 +139,7 @@ XmlElement parse_xml(const std::string& file, const std::string& text) {
     if (child.type() != pugi::node_element) {
       throw InputError(place_of_text(child, places),
                        root ? "text outside of the root element"
-                            : "text in front of the root element: a scene is XML");
+                            : "text before the root element: is this an XML file?");
     }
     if (root) {
       throw InputError(places.at(static_cast<size_t>(child.offset_debug()) - 1),

@@ -1,5 +1,5 @@
 #pragma once
-// Lines of a grid of texture coordinates, where textures jump.
+// Lines of a grid of texture coordinates, where textures are discontinuous.
 #include <array>
 
 #include "src/texture/types.h"

@@ -311,7 +311,7 @@ TEST(MotionBlur, IsRefusedByName) {
   const Image adjoint(16, 16, 3);
   EXPECT_NE(message([&] {
               backward(scene, adjoint, options, {});
-            }).find("reverse mode cannot take the parameter \"sensor.shutter_open\""),
+            }).find("the parameter \"sensor.shutter_open\" has no reverse mode"),
             std::string::npos);
 }
 

@@ -409,8 +409,8 @@ TEST(MendedMesh, WarnsOfLightLostInHollows) {
   // Of (1 - cos 45) / 2 the corners below, which do not lift, lose half.
   EXPECT_EQ(warnings_of(files, folded(1, up)).at(0),
             files.path("m.obj") +
-                ": warning: flat faces hide 7.3 % of a uniform light from the smooth surface that "
-                "the normals mean (in its hollows): a finer mesh or face_normals loses less");
+                ": warning: faces block 7.3 % of uniform light from the smooth surface that their "
+                "normals describe (in concave parts): use a finer mesh or face_normals");
   EXPECT_EQ(warnings_of(files, folded(1, "vn 0 0 1\nvn -1 0 1\nvn 1 0 1\n")).size(), 1u);
   EXPECT_TRUE(warnings_of(files, folded(-1, "vn 0 0 1\nvn 1 0 1\nvn -1 0 1\n")).empty());
 }

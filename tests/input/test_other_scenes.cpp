@@ -223,7 +223,7 @@ TEST(OtherScenes, BatchesAreLists) {
   EXPECT_NE(message_of("<sensor type=\"batch\"/>").find("sensor \"batch\": needs sensors"),
             std::string::npos);
   EXPECT_NE(message_of("<sensor type=\"batch\"><sensor type=\"batch\"/></sensor>")
-                .find("sensor \"batch\": takes no batch"),
+                .find("sensor \"batch\": a batch cannot contain a batch"),
             std::string::npos);
 }
 

@@ -82,7 +82,7 @@ def test_transforms_go_the_way_of_matrices():
     ({"ball": {"type": "globe"}}, r'^dict\.ball: error: unknown type "globe" \(known: aov, area, '),
     ({"ball": {"type": "sphere", "bsdf": {"type": "ref", "id": "wood"}}}, r"^dict\.ball\.bsdf: error"),
     ({"ball": {"type": "sphere", "center": [1, 2]}},
-     r"^dict\.ball\.center: error: expected a number, a word, three numbers"),
+     r"^dict\.ball\.center: error: expected a number, a string, three numbers"),
     ({"ball": 3}, r"^dict\.ball: error: expected a dictionary"),
     ({"type": "shape"}, r"^dict: error: expected \{"),
     ({"ball": {"type": ["x"]}}, r'^dict\.ball: error: expected a word for "type", not \[\'x\'\]'),

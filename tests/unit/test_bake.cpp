@@ -233,16 +233,14 @@ TEST(Bake, SaysWhatItDoesNotKnow) {
   EXPECT_NE(refused(scene).find("bake: direct light alone"), std::string::npos);
   scene =
       over_floor(files, {}, false, sky + square("mirror", 1, 0, {0, 1, 0}, conductor("m", 0.1)));
-  EXPECT_NE(
-      refused(scene).find("bake: shape \"mirror\": only diffuse surfaces without textures are "
-                          "baked, this is roughconductor"),
-      std::string::npos);
+  EXPECT_NE(refused(scene).find("bake: shape \"mirror\": only untextured diffuse surfaces are "
+                                "supported, this is roughconductor"),
+            std::string::npos);
   EXPECT_NE(refused(scene).find(": make it diffuse, or render under each map"), std::string::npos);
   scene = over_floor(files, {}, false, sky + "<emitter type=\"point\" id=\"bulb\"/>");
-  EXPECT_NE(
-      refused(scene).find("bake: emitter \"bulb\": views are of light from shapes and the map "
-                          "alone: remove it"),
-      std::string::npos);
+  EXPECT_NE(refused(scene).find("bake: emitter \"bulb\": only area lights and the environment map "
+                                "are supported: remove it"),
+            std::string::npos);
   scene = over_floor(files, {}, false, sky);
   scene.camera.aperture_radius = 0.1;
   EXPECT_NE(refused(scene).find("needs a pinhole"), std::string::npos);

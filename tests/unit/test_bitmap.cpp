@@ -268,8 +268,8 @@ TEST(Bitmap, NearestTexelsOfBumpsTakeNothingThatMoves) {
       message = error.what();
     }
     EXPECT_EQ(message, "string: error: parameter \"" + std::string(name) +
-                           "\": texels' borders would move unseen, of the nearest bitmap of a "
-                           "light or bumpmap: use bilinear");
+                           "\": no term covers texel borders of a nearest bitmap of a light or "
+                           "bumpmap: use bilinear");
   }
   EXPECT_THROW(find_parameter(scene, "s.translate.w"), UnknownParameter);
 }

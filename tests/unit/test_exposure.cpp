@@ -170,7 +170,7 @@ TEST(Exposure, ErrorsHavePlaces) {
          "keyframes may differ by rotations, translations and uniform scales alone");
   expect(message_of(keys(R"(<transform time="1"><scale x="-1"/></transform>)")),
          "keyframes may differ");
-  expect(message_of(keys(R"(<transform time="0"/>)")), "its times must grow");
+  expect(message_of(keys(R"(<transform time="0"/>)")), "times must increase");
   expect(message_of(keys(R"(<scale x="2"/>)")), "takes <transform time=");
   expect(message_of(keys("<transform/>")), "\"time\" is missing");
   expect(message_of("", 1, 0), "shutter_close: must not be before shutter_open");

@@ -21,10 +21,10 @@ struct Keyframe {
   Vec3d turn = {};   // a rotation vector: from here to the next keyframe, the short way
 };
 
-// The motion of a shape or a camera: by keyframes as in Mitsuba 3 (place and scale are linear in
-// time between two, rotations turn at a constant rate, and all is constant before the first and
-// after the last); beside that by a velocity and a spin about the center, which are still at the
-// exposure's reference time.
+// The motion of a shape or a camera: by keyframes (place and scale are linear in time between two,
+// rotations turn at a constant rate, and all is constant before the first and after the last), and
+// by a velocity and a spin about the center, which displace nothing at the exposure's reference
+// time.
 struct Course {
   std::vector<Keyframe> keyframes;  // in order; none: still
   Vec3d center;                     // at the reference time, world space
@@ -47,7 +47,7 @@ struct Exposure {
   std::vector<Shutter> shutters;  // of each sensor
   std::vector<Course> cameras;    // of each sensor
   std::vector<Course> shapes;     // of each shape
-  // None, where that is known of the scene; else null.
+  // Empty if the scene is known to have no coincident faces; else null.
   std::shared_ptr<const CoincidentFaces> no_overlaps;
 };
 
@@ -63,11 +63,11 @@ void check_still(const Scene& scene, const std::string& what);
 Scene at_time(const Scene& scene, double u);
 // The same in place: from the reference time, once.
 void set_time(Scene& scene, double u);
-// Looks once whether faces coincide. If none does, at_time() knows the same of all times when what
-// moves is away from all else. The scene must stay where it is meanwhile.
+// Tests once whether faces coincide. If none do, at_time() skips the test at times at which moving
+// shapes are clear of all others. The scene must outlive this knowledge, at its address.
 void find_overlaps(Scene& scene, int threads);
-// Takes the derivative by a shape's vertex at the time u to that by the vertex at the reference
-// time.
+// The matrix from the derivative with respect to a shape's vertex at the time u to that with
+// respect to the vertex at the reference time.
 Matrix4 pulls_back(const Scene& scene, ShapeId shape, double u);
 
 // To be changed: no other scene shares it afterwards. The scene must have an exposure.

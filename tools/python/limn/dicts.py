@@ -269,7 +269,7 @@ class _Writer:
             self.element(place, "point", name=name, value=_three(value))
         else:
             raise InputError(
-                f"{place}: error: expected a number, a word, three numbers, a Transform, a (4, 4) or "
+                f"{place}: error: expected a number, a string, three numbers, a Transform, a (4, 4) or "
                 f"(3, 3) array, or a dictionary with a type, not {type(value).__name__}"
             )
 

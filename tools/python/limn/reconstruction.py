@@ -158,7 +158,7 @@ def _errors(model: Model, views: Sequence[View], seconds: float, steps: int | No
 def _write_errors(file: str, errors: dict[str, Any]) -> None:
     told = {
         "about": "standard errors per vertex of object.ply: position along the normal [scene "
-        "units], colour [linear], roughness; from two fits, each without another quarter of the "
+        "units], colour [linear], roughness; from two refits, each without another quarter of the "
         "views",
         **{k: np.round(v, 7).tolist() if isinstance(v, np.ndarray) else v
            for k, v in errors.items()},
