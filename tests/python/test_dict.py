@@ -340,7 +340,7 @@ def test_scenes_have_settings_and_batches():
 @pytest.mark.parametrize("change, text", [
     ({"spectral": True}, r'^dict\.spectral: error: <scene>: unknown parameter "spectral" \(known: '),
     ({"c": {"type": "diffuse", "reflectance": {"type": "spectrum", "value": [(400, 1), 3]}}},
-     r"^dict\.c\.reflectance\.value: error: expected one or three numbers, or pairs"),
+     r"^dict\.c\.reflectance\.value: error: expected one number, or pairs"),
     ({"c": {"type": "diffuse", "reflectance": {"type": "rgb", "value": "red"}}},
      r'^dict\.c\.reflectance: error: <rgb>: value must be 1 or 3 finite numbers, not "red"'),
     ({"c": {"type": "diffuse", "reflectance": {"type": "rgb", "value": {"r": 1}}}},

@@ -229,9 +229,10 @@ class _Writer:
                 f"{float(at)!r}:{float(v)!r}" for at, v in value)
             return {"value": pairs}
         except (TypeError, ValueError):
-            more = ", or pairs of a wavelength and a number" if kind == "spectrum" else ""
+            known = ("one number, or pairs of a wavelength and a number" if kind == "spectrum"
+                     else "one or three numbers")
             raise InputError(
-                f"{place}.value: error: expected one or three numbers{more}, not {value!r}"
+                f"{place}.value: error: expected {known}, not {value!r}"
             ) from None
 
     def image(self, place: str, what: Mapping[str, Any]) -> dict[str, Any]:
