@@ -163,8 +163,8 @@ uint32_t ParameterSlots::take(uint32_t count, double unit) {
 ParameterSlots::Dependence ParameterSlots::dependence_of(const Scene& scene,
                                                          const Parameter& parameter) const {
   if (moves_unknown(scene, parameter)) {
-    throw InputError({scene.file}, "the parameter \"" + parameter.name +
-                                       "\" has no reverse mode: use gradient");
+    throw InputError({scene.file},
+                     "the parameter \"" + parameter.name + "\" has no reverse mode: use gradient");
   }
   Dependence dependence;
   dependence.texels = parameter.texel_map(scene_);
