@@ -401,15 +401,19 @@ size_t steps_to_make(Estimators estimators, RunSettings settings) {
 // Batches have so many times at most: estimators are set up for each. Not tuned.
 constexpr int kMostTimes = 16;
 
-// In [0, 1), the k-th of n strata. Where numbers are even in the run, times are, too.
-double draw_time(Estimators estimators, const Batch& part, int k, int n) {
-  const bool even = std::ranges::any_of(estimators, [](const auto& estimator) {
-    return estimator->numbers() == Numbers::kEvenInRun;
-  });
+// In [0, 1), for a part of a batch: strata are as wide as their parts' shares of the samples. Where
+// numbers are even in the run, times are, too, if each sample has its own: every second number of
+// such a sequence is not.
+double draw_time(Estimators estimators, const Batch& batch, const Batch& part) {
+  const bool even =
+      batch.count() <= kMostTimes && std::ranges::any_of(estimators, [](const auto& estimator) {
+        return estimator->numbers() == Numbers::kEvenInRun;
+      });
   constexpr uint64_t kStream = 0x74696d65;  // apart from pixels
   const auto sample = static_cast<uint32_t>(part.first);
   Rng rng = even ? Rng::even(part.seed, kStream, sample) : Rng(part.seed, kStream, sample);
-  return even ? rng.uniform() : (k + rng.uniform()) / n;
+  if (even) return rng.uniform();
+  return (part.first - batch.first + rng.uniform() * part.count()) / batch.count();
 }
 
 void add(const std::vector<double>& from, std::vector<double>& to) {
@@ -439,7 +443,7 @@ std::vector<BatchSums> run_batch_at(const EstimatorsAt& at, Estimators estimator
   };
   for (int k = 0; k < times; ++k) {
     const Batch part{batch.seed, begin(k), begin(k + 1)};
-    const EstimatorsAtTime now = at(draw_time(estimators, part, k, times));
+    const EstimatorsAtTime now = at(draw_time(estimators, batch, part));
     std::vector<BatchSums> more = run_batch(now.list, part, threads, progress);
     if (progress.stopped()) return {};
     for (size_t i = 0; i < sums.size(); ++i) merge(more[i], *estimators[i], sums[i]);
