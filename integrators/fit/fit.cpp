@@ -12,6 +12,7 @@
 #include "integrators/methods/selection.h"
 #include "integrators/terms/term.h"
 #include "limn/core/error.h"
+#include "limn/core/exposure.h"
 #include "limn/core/rng.h"
 #include "limn/integrators/methods.h"
 #include "limn/integrators/options.h"
@@ -45,6 +46,31 @@ void set_camera(Camera& camera, const std::vector<double>& numbers) {
   for (Dual* v : {&camera.fov, &camera.aperture_radius, &camera.focus_distance}) {
     v->v = numbers[next++];
   }
+}
+
+// What translations take along: of shapes, and of the camera.
+std::vector<Vec3d*> course_points(Scene& scene, const std::vector<ShapeId>& shapes) {
+  if (!scene.exposure) return {};
+  Exposure& exposure = own_exposure(scene);
+  std::vector<Course*> courses = {&exposure.cameras[scene.sensor]};
+  for (const ShapeId s : shapes) courses.push_back(&exposure.shapes[s.index()]);
+  std::vector<Vec3d*> points;
+  for (Course* course : courses) {
+    points.push_back(&course->center);
+    for (Keyframe& key : course->keyframes) points.push_back(&key.place);
+  }
+  return points;
+}
+
+std::vector<double> course_numbers(const Scene& scene, const std::vector<ShapeId>& shapes) {
+  Scene hull;
+  hull.exposure = scene.exposure;
+  hull.sensor = scene.sensor;
+  std::vector<double> numbers;
+  for (const Vec3d* p : course_points(hull, shapes)) {
+    numbers.insert(numbers.end(), {p->x, p->y, p->z});
+  }
+  return numbers;
 }
 
 [[noreturn]] void refuse_state() {
@@ -361,7 +387,8 @@ FitState Fit::Impl::state() const {
   for (const FitParameter& p : parameters_) state.parameters.push_back(p.state());
   for (size_t v = 0; v < views.size(); ++v) {
     const Scene& scene = views[v].scene;
-    FitState::View view{camera_numbers(scene.camera), {}, {}, {}};
+    FitState::View view{
+        camera_numbers(scene.camera), {}, {}, course_numbers(scene, moved_shapes(v)), {}};
     for (const ShapeId s : moved_shapes(v)) {
       const Mesh& mesh = scene.shape(s).mesh;
       view.shapes.push_back({mesh.positions, mesh.normals, mesh.faces});
@@ -400,6 +427,7 @@ void Fit::Impl::check_state(const FitState& state) const {
     const std::vector<ShapeId> shapes = moved_shapes(v);
     check(view.camera.size() == 15 && view.shapes.size() == shapes.size() &&
           view.values.size() == parameters_.size());
+    check(view.courses.size() == course_numbers(views[v].scene, shapes).size());
     for (size_t i = 0; i < parameters_.size(); ++i) {
       check(view.values[i].size() == values_in(v, parameters_[i]).size());
     }
@@ -463,6 +491,10 @@ void Fit::Impl::put(const FitState& state) {
       next = end;
     }
     set_camera(scene.camera, view.camera);
+    const double* number = view.courses.data();
+    for (Vec3d* p : course_points(scene, shapes)) {
+      for (int k = 0; k < 3; ++k) (*p)[k] = *number++;
+    }
   }
   for (size_t i = 0; i < parameters_.size(); ++i) {
     parameters_[i].restore(state.parameters[i], views, remeshed[i]);

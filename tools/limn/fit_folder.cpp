@@ -43,7 +43,7 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ViewArguments, scene, defines, sensor, target
                                    fingerprints)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FitState::Numbers, values, first, second, natural_step, lambda)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FitState::Shape, positions, normals, faces)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FitState::View, camera, shapes, values, texels)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FitState::View, camera, shapes, values, courses, texels)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FitState, steps, parameters, moves, changes, views)
 
 namespace {
@@ -51,7 +51,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-constexpr int kFormat = 4;                  // of fit.json and state.cbor
+constexpr int kFormat = 5;                  // of fit.json and state.cbor
 constexpr size_t kDistanceSamples = 10000;  // on each surface; not tuned
 
 // Calls visit(name, member) for what is no row of the table of options: reading and writing go over

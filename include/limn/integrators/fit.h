@@ -130,6 +130,8 @@ struct FitState {
     std::vector<double> camera;               // origin, left, up, forward, fov, lens
     std::vector<Shape> shapes;                // of those that are moved, in the scene's order
     std::vector<std::vector<double>> values;  // of each parameter but vertices; empty: it has none
+    // 3 each, of the courses of moved shapes and of the camera: the center and keyframes' places.
+    std::vector<double> courses;
     // H by W by 3 each, of the maps that motions without values move.
     std::vector<float> texels;
   };
