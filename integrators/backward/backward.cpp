@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "integrators/backward/faces_gradient.h"
+#include "integrators/backward/parameter_slots.h"
 #include "integrators/backward/reverse_estimator.h"
 #include "integrators/estimates/batches.h"
 #include "integrators/methods/hair_gaps.h"
@@ -69,7 +70,7 @@ BackwardResult run(const Scene& scene, std::unique_ptr<Estimator> owned, const I
   std::vector<std::unique_ptr<SampleEstimator>> estimators;
   estimators.push_back(std::move(owned));
   EstimatorsAt at;
-  if (!kExact && is_moving(scene)) {
+  if (!kExact && needs_times(scene, estimator.parameters().parameters())) {
     at = [&](double u) {
       EstimatorsAtTime now;
       now.list.push_back(
@@ -124,7 +125,7 @@ std::vector<std::string> trace_backward(const Scene& scene, const Image& adjoint
                                         const BackwardOptions& options, const RunSettings& settings,
                                         const NonFinite::SampleId& place) {
   check(options);
-  check_still(scene, "the trace of one sample (debug-sample)");
+  check_still(scene, "the trace of one sample (debug-sample)", reverse_parameters(scene, options));
   SampleLog log;
   const auto trace = [&](const auto& estimator) {
     for (const Parameter& p : estimator.parameters().parameters()) {

@@ -8,12 +8,14 @@
 #include "integrators/methods/faces_estimator.h"
 #include "integrators/methods/selection.h"
 #include "integrators/paths/path_follow.h"
+#include "limn/core/exposure.h"
 
 namespace limn {
 
 FacesGradient::FacesGradient(const Scene& scene, const Image& adjoint,
                              const BackwardOptions& options, int threads)
-    : adjoint_((check_faces_film(scene), adjoint_pixels(scene, adjoint))),
+    : adjoint_((check_still(scene, kFacesUser.name, reverse_parameters(scene, options)),
+                check_faces_film(scene), adjoint_pixels(scene, adjoint))),
       parameters_(scene, reverse_parameters(scene, options)),
       faces_(std::make_shared<CoincidentFaces>(parameters_.scene(), threads)),
       pixels_(parameters_.scene(), *faces_, threads, kFacesUser),

@@ -147,7 +147,7 @@ std::vector<Moments> forward_sums(const Scene& scene, std::span<const Parameter>
       }
     };
     run_batches(still.list, settings, watch, take,
-                is_moving(scene) ? EstimatorsAt(at_u) : EstimatorsAt());
+                needs_times(scene, some) ? EstimatorsAt(at_u) : EstimatorsAt());
   }
   return moments;
 }

@@ -8,6 +8,7 @@
 #include "integrators/paths/camera_path.h"
 #include "integrators/paths/path_follow.h"
 #include "integrators/paths/path_log.h"
+#include "limn/core/exposure.h"
 
 namespace limn {
 
@@ -32,7 +33,7 @@ struct FacesEstimator::Group {
 
 FacesEstimator::FacesEstimator(const Scene& scene, std::span<const Parameter> parameters,
                                int threads)
-    : scene_((check_faces_film(scene), scene)),
+    : scene_((check_still(scene, kFacesUser.name, parameters), check_faces_film(scene), scene)),
       lanes_(static_cast<int>(std::min<size_t>(parameters.size(), kLanes))),
       faces_(std::make_shared<CoincidentFaces>(scene, threads)),
       pixels_(scene, *faces_, threads, kFacesUser),

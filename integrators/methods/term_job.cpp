@@ -69,6 +69,12 @@ constexpr double kSetupShare = 1.0 / 32;
 // When a pilot looks at a scene that moves: at the reference time velocities change nothing.
 constexpr double kPilotTime = 0.75;  // not tuned
 
+std::vector<Parameter> find_parameters(const Scene& scene, const std::vector<std::string>& names) {
+  std::vector<Parameter> parameters;
+  for (const std::string& name : names) parameters.push_back(find_parameter(scene, name));
+  return parameters;
+}
+
 // A whole run of one method.
 class TermJob {
  public:
@@ -77,17 +83,18 @@ class TermJob {
       : scene_(scene),
         options_(options),
         method_(method),
-        moving_(is_moving(scene)),
+        parameters_(find_parameters(scene, options.parameters)),
+        moving_(needs_times(scene, parameters_)),
         // What a pilot finds of turns and of positions on the film holds for its own time alone.
         moves_film_(method.moves_film && !options.exact_film && scene.camera.is_pinhole() &&
                     !moving_),
         types_(terms_of(scene, method.sampler, method.closed, moves_film_)) {
     const std::vector<std::string> chosen = selected_terms(term_names(), options.terms, scene.file);
     if (options.samples) check_samples(*options.samples);
-    for (const auto& name : options.parameters) parameters_.push_back(find_parameter(scene, name));
     moved_ = moved_in(scene, parameters_);
     keep_changed(chosen);
     if (options.exact_film) {
+      check_still(scene, "the exact film", parameters_);
       visible_ = std::make_shared<FilmRegions>(scene, settings.threads, settings.interrupted);
     }
     if (moving_) method_.moves_directions = method_.random_directions = false;
@@ -124,7 +131,7 @@ class TermJob {
   }
 
   std::vector<std::string> trace(const RunSettings& settings, const NonFinite::SampleId& place) {
-    check_still(scene_, "the trace of one sample (debug-sample)");
+    check_still(scene_, "the trace of one sample (debug-sample)", parameters_);
     GradientResult unused = empty_result();
     const Stopwatch watch;
     plan(settings, watch, unused);
@@ -578,11 +585,11 @@ class TermJob {
   const Scene& scene_;
   const GradientOptions& options_;
   TermMethod method_;
+  std::vector<Parameter> parameters_;
   bool moving_;      // whether samples have times
   bool moves_film_;  // whether positions on the film may move
   mutable std::optional<bool> has_all_edges_;
   std::shared_ptr<const FilmRegions> visible_;
-  std::vector<Parameter> parameters_;
   Moved moved_;                          // by any of the parameters
   std::vector<const TermType*> types_;   // that can differ from zero
   std::vector<bool> computed_;           // of each term

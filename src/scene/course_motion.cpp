@@ -1,6 +1,9 @@
 // Velocities and spins of shapes and cameras, and the times of the shutter.
+#include <fmt/format.h>
+
 #include <algorithm>
 
+#include "limn/core/error.h"
 #include "limn/core/exposure.h"
 #include "src/scene/motion.h"
 #include "src/scene/motion_lists.h"
@@ -22,7 +25,7 @@ class ExposureNumber : public Motion {
     return {number(*scene.exposure, scene.sensor).v};
   }
   void assign(Scene& scene, const std::string& name, const std::vector<double>& value,
-              std::vector<std::string>*) const final {
+              std::vector<std::string>*) const override {
     check_numbers(scene, name, value, 1, -kLargestCoordinate, kLargestCoordinate);
     own(scene).v = value[0];
   }
@@ -67,6 +70,18 @@ class ShutterTime final : public ExposureNumber {
  public:
   ShutterTime(Dual Shutter::*time, const Moved& moved) : time_(time), moved_(moved) {}
   Moved moved() const override { return moved_; }
+  void assign(Scene& scene, const std::string& name, const std::vector<double>& value,
+              std::vector<std::string>* warnings) const override {
+    const Shutter& now = scene.exposure->shutters[scene.sensor];
+    const bool opens = time_ == &Shutter::open;
+    if (value.size() == 1 && (opens ? value[0] > now.close.v : value[0] < now.open.v)) {
+      throw InputError({scene.file},
+                       fmt::format("parameter \"{}\": {:g}: it must not be {}, {:g}", name,
+                                   value[0], opens ? "after shutter_close" : "before shutter_open",
+                                   opens ? now.close.v : now.open.v));
+    }
+    ExposureNumber::assign(scene, name, value, warnings);
+  }
 
  protected:
   Dual& number(Exposure& exposure, size_t sensor) const override {
@@ -80,17 +95,27 @@ class ShutterTime final : public ExposureNumber {
 
 void add_rates(const Scene& scene, const std::string& id, ShapeId shape, double size,
                std::vector<Parameter>& list) {
+  const Course& course =
+      shape.valid() ? scene.exposure->shapes[shape.index()] : scene.exposure->cameras[scene.sensor];
   for (const bool spins : {false, true}) {
     for (int axis = 0; axis < 3; ++axis) {
       list.push_back({id + (spins ? ".spin." : ".velocity.") + "xyz"[axis],
                       spins ? "radians per unit of time" : "scene units per unit of time",
                       0.01 * (spins ? 1 : size) / half_open(scene), 1,
                       std::make_shared<CourseRate>(shape, spins, axis)});
+      // Of a course at rest the derivative is that of a translation or a rotation, times a time.
+      list.back().repeats = !course.moves();
     }
   }
 }
 
 }  // namespace
+
+bool needs_times(const Scene& scene, std::span<const Parameter> parameters) {
+  return is_moving(scene) || std::ranges::any_of(parameters, [](const Parameter& parameter) {
+           return dynamic_cast<const ExposureNumber*>(parameter.motion.get()) != nullptr;
+         });
+}
 
 void add_course_parameters(const Scene& scene, std::vector<Parameter>& list) {
   if (!scene.exposure || !(half_open(scene) > 0)) return;

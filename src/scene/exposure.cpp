@@ -237,8 +237,9 @@ bool is_moving(const Scene& scene) {
          std::any_of(exposure.shapes.begin(), exposure.shapes.end(), moves);
 }
 
-void check_still(const Scene& scene, const std::string& what) {
-  if (!is_moving(scene)) return;
+void check_still(const Scene& scene, const std::string& what,
+                 std::span<const Parameter> parameters) {
+  if (!needs_times(scene, parameters)) return;
   throw InputError({scene.file}, what +
                                      " cannot take a scene in which something moves while the "
                                      "shutter is open: shutter_close must be shutter_open");

@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "integrators/estimates/batches.h"
+#include "limn/core/error.h"
 #include "limn/core/exposure.h"
 #include "limn/core/parameter.h"
 #include "limn/integrators/backward.h"
@@ -281,6 +283,135 @@ TEST(MotionBlur, VelocityIsFitted) {
   EXPECT_NEAR(found, truth, 0.1);
 }
 
+// Every sample adds its time.
+class Clock final : public SampleEstimator {
+ public:
+  Clock(const Scene& scene, double time, Numbers numbers)
+      : scene_(scene), time_(time), numbers_(numbers) {}
+  const Scene& scene() const override { return scene_; }
+  size_t slots() const override { return 1; }
+  const char* slot_name(size_t) const override { return "time"; }
+  Numbers numbers() const override { return numbers_; }
+  void add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const override {
+    for (const KeyedSample& one : samples) sink.add_radiance(one.at, {time_, time_, time_}, 1);
+  }
+
+ private:
+  const Scene& scene_;
+  double time_;
+  Numbers numbers_;
+};
+
+// The mean times of batches of more samples than a batch has times, 17 and 32, each in many runs.
+TEST(MotionBlur, TimesAreUniformInLargeBatches) {
+  SceneParts parts;
+  parts.width = parts.height = 1;
+  const Scene scene = scene_of_text(scene_text(parts));
+  for (const auto& [numbers, spp, count] :
+       {std::tuple{Numbers::kIndependent, 560, 17}, {Numbers::kEvenInRun, 1056, 32}}) {
+    double sum = 0, squares = 0;
+    int batches = 0;
+    for (int seed = 0; seed < 50; ++seed) {
+      const auto at = [&](double u) {
+        EstimatorsAtTime now;
+        now.list.push_back(std::make_unique<Clock>(scene, u, numbers));
+        return now;
+      };
+      RunSettings settings;
+      settings.spp = spp;
+      settings.seed = seed;
+      const auto take = [&](const Batch& batch, const auto& sums) {
+        if (batch.count() != count) return;
+        const double off = sums[0].radiance[0] / count - 0.5;
+        sum += off;
+        squares += off * off;
+        ++batches;
+      };
+      run_batches(at(0).list, settings, Stopwatch(), take, at);
+    }
+    ASSERT_GE(batches, 50);
+    const double rms = std::sqrt(squares / batches);
+    EXPECT_LT(rms, 0.01) << count;  // of 16 equal strata 16^-1.5 / sqrt(12) = 0.0045
+    EXPECT_LT(std::fabs(sum / batches), 4 * rms / std::sqrt(batches)) << count;
+  }
+}
+
+// Nothing moves yet while the shutter is open.
+Scene at_rest(const TempFiles& files) {
+  return scene_of_text(with_shutter(mixed(files, false), 0, 1));
+}
+
+TEST(MotionBlur, VelocitiesAtRestAgree) {
+  const TempFiles files;
+  Scene scene = at_rest(files);
+  BackwardOptions options;
+  options.parameters = {"ball.velocity.y", "cube.spin.y", "sensor.velocity.x"};
+  expect_modes_agree(scene, 64, options);
+  // Between two and three half-exposures after the reference time, 1/2: by 1 in the mean.
+  own_exposure(scene).shutters[0] = {1, 2};
+  for (const ReverseCheck& check : expect_modes_agree(scene, 64, options)) {
+    EXPECT_NE(check.forward, 0) << check.parameter;
+  }
+  RunSettings settings;
+  settings.spp = 256;
+  const auto derivatives = [&](const std::string& of, const std::string& camera, uint64_t seed) {
+    settings.seed = seed;
+    GradientOptions forward;
+    forward.parameters = {of, camera};
+    return gradient(scene, forward, settings).parameters;
+  };
+  const auto moved = derivatives("ball.translate.y", "sensor.translate.x", 1);
+  const auto faster = derivatives("ball.velocity.y", "sensor.velocity.x", 2);
+  for (size_t k = 0; k < 2; ++k) {
+    MeanOfRuns mean;
+    mean.add(moved[k].total, 1);
+    expect_plausible(k == 0 ? "ball" : "sensor", mean.scores(faster[k].total));
+  }
+}
+
+TEST(MotionBlur, VelocitiesAtRestAreAskedForByName) {
+  const TempFiles files;
+  const auto listed = [](const Scene& scene, const std::string& part) {
+    RunSettings settings;
+    settings.spp = 1;
+    std::vector<std::string> names;
+    for (const auto& one : backward(scene, Image(16, 16, 3), {}, settings).parameters) {
+      if (one.name.find(part) != std::string::npos) names.push_back(one.name);
+    }
+    return names;
+  };
+  EXPECT_EQ(listed(at_rest(files), "velocity").size(), 0u);
+  EXPECT_EQ(listed(at_rest(files), "spin").size(), 0u);
+  EXPECT_EQ(listed(at_rest(files), "ball.translate").size(), 3u);
+  const Scene scene = moving(files);
+  EXPECT_EQ(listed(scene, "floor.velocity").size(), 0u);
+  EXPECT_EQ(listed(scene, "cube.velocity").size(), 3u);
+  EXPECT_EQ(listed(scene, "ball.spin").size(), 3u);
+  EXPECT_EQ(listed(scene, "sensor.spin").size(), 3u);
+}
+
+// What shapes turn about, and where keyframes are, goes with them.
+TEST(MotionBlur, FitsGoOnWhereTheyWere) {
+  const TempFiles files;
+  FitOptions options;
+  options.parameters = {"cube.translate.x", "ball.translate.z", "sensor.translate.x"};
+  RunSettings settings;
+  settings.spp = 2;
+  const auto start = [&] {
+    return Fit({{moving(files), Image(16, 16, 3), {}}}, options, settings);
+  };
+  Fit whole = start(), second = start();
+  ASSERT_TRUE(whole.step());
+  second.restore(whole.state());
+  const auto late = [](const Fit& fit) { return at_time(fit.views()[0].scene, 1); };
+  const Scene a = late(whole), b = late(second), before = late(start());
+  for (size_t s = 0; s < a.shapes.size(); ++s) {
+    EXPECT_EQ(a.shapes[s].mesh.positions, b.shapes[s].mesh.positions) << s;
+  }
+  EXPECT_EQ(value(a.camera.origin), value(b.camera.origin));
+  EXPECT_NE(a.shapes[1].mesh.positions, before.shapes[1].mesh.positions);
+}
+
 TEST(MotionBlur, IsRefusedByName) {
   const TempFiles files;
   const Scene scene = moving(files);
@@ -296,6 +427,24 @@ TEST(MotionBlur, IsRefusedByName) {
     return message([&] { render(scene, {}, options); });
   };
   const std::string refused = " cannot take a scene in which something moves";
+  // Where nothing moves yet, but its derivative is asked for.
+  GradientOptions rate;
+  rate.parameters = {"ball.velocity.y"};
+  rate.points = FilmPoints::kFaces;
+  rate.method = "analytic";
+  SceneParts still;
+  still.max_depth = 2;
+  still.body = square("ball", 1, 0, {0, 0, 0}, diffuse("grey", "0.5")) +
+               square("lamp", 0.4, 90, {0, 3, 0}, area_light("glow", "1"));
+  const Scene rest = scene_of_text(with_shutter(still, 0, 1));
+  const std::string forward = message([&] { gradient(rest, rate, {}); });
+  EXPECT_NE(forward.find(refused), std::string::npos) << forward;
+  BackwardOptions back;
+  back.parameters = rate.parameters;
+  back.points = FilmPoints::kFaces;
+  back.method = "analytic";
+  const std::string reverse = message([&] { backward(rest, Image(16, 16, 3), back, {}); });
+  EXPECT_NE(reverse.find(refused), std::string::npos) << reverse;
   RenderOptions exact;
   exact.exact_film = true;
   EXPECT_NE(image(exact).find("the exact film" + refused), std::string::npos);

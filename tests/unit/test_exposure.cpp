@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "limn/core/error.h"
 #include "limn/core/exposure.h"
 #include "limn/core/parameter.h"
 #include "limn/core/rng.h"
@@ -144,6 +145,24 @@ TEST(Exposure, ParametersNeedAnOpenShutter) {
   EXPECT_FALSE(is_moving(open));
   EXPECT_TRUE(is_moving(find_parameter(open, "ball.velocity.x").moved(open, 0.1)));
   EXPECT_FALSE(is_moving(open));
+}
+
+TEST(Exposure, ShuttersCloseAfterTheyOpen) {
+  const TempFiles files;
+  Scene scene = moving(files);
+  const auto expect = [&](const std::string& name, double value, const std::string& part) {
+    try {
+      find_parameter(scene, name).assign(scene, {value});
+      ADD_FAILURE() << name;
+    } catch (const InputError& error) {
+      EXPECT_NE(std::string(error.what()).find(part), std::string::npos) << error.what();
+    }
+  };
+  expect("sensor.shutter_open", 1.5, "it must not be after shutter_close, 1");
+  expect("sensor.shutter_close", -0.5, "it must not be before shutter_open, 0");
+  find_parameter(scene, "sensor.shutter_open").assign(scene, {0.5});
+  EXPECT_EQ(scene.exposure->shutters[0].open.v, 0.5);
+  EXPECT_EQ(scene.exposure->shutters[0].close.v, 1);
 }
 
 std::string message_of(const std::string& body, double open = 0, double close = 1) {

@@ -2,6 +2,7 @@
 // How shapes and cameras move while a shutter is open. Samples of an image have times, uniform
 // between the shutter's opening and its closing.
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,7 @@
 namespace limn {
 
 struct CoincidentFaces;  // coincident_faces.h
+struct Parameter;        // parameter.h
 
 struct Keyframe {
   double time = 0;
@@ -54,8 +56,12 @@ struct Exposure {
 // Whether images of the scene are means over times: something moves while the sensor's shutter is
 // open.
 bool is_moving(const Scene& scene);
-// InputError if it is: `what` cannot take it.
-void check_still(const Scene& scene, const std::string& what);
+// Whether derivatives with respect to the parameters are: it is moving, or one of them makes it
+// move, as the velocity of a shape at rest does.
+bool needs_times(const Scene& scene, std::span<const Parameter> parameters);
+// InputError if they are: `what` cannot take it.
+void check_still(const Scene& scene, const std::string& what,
+                 std::span<const Parameter> parameters = {});
 
 // The scene as it is at a time, the fraction u of the way from opening to closing, with the
 // derivatives that its exposure, vertices and camera have been seeded with. It shares BSDFs,

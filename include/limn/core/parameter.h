@@ -69,8 +69,9 @@ struct Parameter {
   // returns one derivative per channel. NAME.r, NAME.g and NAME.b change one channel each.
   bool colour = false;
   std::vector<size_t> array = {};  // {V, 3}, {V}, {H, W, 3}; {} of scalars
-  // True if the derivative repeats that of another array in different coordinates (displacement
-  // repeats vertex_positions). Such a parameter is skipped when all are requested.
+  // True if the derivative repeats that of another parameter in different coordinates (displacement
+  // that of vertex_positions, the velocity of what is at rest that of its translation). Such a
+  // parameter is skipped when all are requested.
   bool repeats = false;
 
   // Shape of the reverse-mode derivative: {} for a number, {3} for a colour, else `array`.
