@@ -265,7 +265,7 @@ FAULTS = [
     Fault("exposure", "the course stays behind", "src/scene/exposure.cpp",
           " + course.shift - apply(at_.linear, course.shift)", "", "test_exposure"),
     Fault("exposure", "times up to the middle of their strata", "integrators/estimates/batches.cpp",
-          "(k + rng.uniform()) / n", "(k + 0.5 * rng.uniform()) / n",
+          "rng.uniform() * part.count()", "0.5 * rng.uniform() * part.count()",
           "test_motion_blur", "MotionBlur.Of*:MotionBlur.Is*"),
     Fault("exposure", "derivatives half of a velocity's", "src/scene/exposure.cpp",
           "of_all_ = velocity * at_.since", "of_all_ = velocity * (0.5 * at_.since)",
