@@ -37,7 +37,8 @@ struct Quadratic {
     return part;
   }
   bool may_vanish(double far) const;
-  bool is_injective() const;
+  std::array<double, 2> determinants() const;
+  double extent() const;
   std::optional<Vec3d> zero() const;
 };
 
@@ -54,19 +55,22 @@ bool Quadratic::may_vanish(double far) const {
   constexpr double kRounding = 1e-8;  // of crossings on sides, and more
   const double margin = kRounding * (size + std::fabs(low) + std::fabs(high));
   if (high < -margin || low > far + margin) return false;
-  // The line is outside if, as seen from it, all points lie to the left of one of them.
+  // The line is outside if, as seen from it, all points lie to the left of one of them, or before
+  // it, as those of a patch that is seen edge-on.
   for (size_t i = 0; i < hull.size(); ++i) {
-    bool left = true;
-    for (size_t j = 0; left && j < hull.size(); ++j)
-      left = i == j || turn(hull[i], hull[j]) > margin * size;
-    if (left) return false;
+    bool left = true, before = true;
+    for (size_t j = 0; (left || before) && j < hull.size(); ++j) {
+      left = left && (i == j || turn(hull[i], hull[j]) > margin * size);
+      before = before && hull[i].x * hull[j].x + hull[i].y * hull[j].y > margin * size;
+    }
+    if (left || before) return false;
   }
   return true;
 }
 
-// Whether det J has one sign: the coefficients of a quadratic bound it.
-bool Quadratic::is_injective() const {
-  double low = 0, high = 0;
+// Bounds of det J, by the coefficients of a quadratic.
+std::array<double, 2> Quadratic::determinants() const {
+  double low = INFINITY, high = -INFINITY;
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j <= i; ++j) {
       const double d =
@@ -74,7 +78,18 @@ bool Quadratic::is_injective() const {
       low = std::min(low, d), high = std::max(high, d);
     }
   }
-  return low == 0 || high == 0;
+  return {low, high};
+}
+
+// The square of its size, across the line.
+double Quadratic::extent() const {
+  double most = 0;
+  for (int i = 0; i < 3; ++i) {
+    const Vec3d side = q[i][i] - q[(i + 1) % 3][(i + 1) % 3];
+    const Vec3d bow = q[i][(i + 1) % 3] * 2 - q[i][i] - q[(i + 1) % 3][(i + 1) % 3];
+    most = std::max({most, side.x * side.x + side.y * side.y, bow.x * bow.x + bow.y * bow.y});
+  }
+  return most;
 }
 
 // By Newton's method from the middle; none if it does not end inside.
@@ -115,10 +130,14 @@ struct Zeros {
 
 void Zeros::find(const Quadratic& map, const Triangle& corners, int depth) {
   constexpr int kDeepest = 10;  // a thousandth of a side: zeros are double ones there
+  constexpr double kEdgeOn = 1e-10;
   if (!map.may_vanish(far)) return;
   const auto zero = map.zero();
   if (zero) add(corners[0] * zero->x + corners[1] * zero->y + corners[2] * zero->z);
-  if ((zero && map.is_injective()) || depth == kDeepest) return;
+  const auto [low, high] = map.determinants();
+  if ((zero && (low >= 0 || high <= 0)) || depth == kDeepest) return;
+  // Edge-on, but for rounding: nothing is met at a single point.
+  if (std::max(-low, high) <= kEdgeOn * map.extent()) return;
   const Triangle middle = {Vec3d{0, 0.5, 0.5}, Vec3d{0.5, 0, 0.5}, Vec3d{0.5, 0.5, 0}};
   for (int i = 0; i < 4; ++i) {
     Triangle part = middle;
