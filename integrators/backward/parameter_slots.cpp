@@ -14,7 +14,7 @@ namespace limn {
 
 namespace {
 
-// Whether a parameter moves more than one shape's vertices, as times of a shutter do.
+// Whether a parameter moves vertices that velocities() does not tell, as shutter times do.
 bool moves_unknown(const Scene& scene, const Parameter& parameter) {
   if (!moved_by({&parameter, 1}).vertices) return false;
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
@@ -197,7 +197,7 @@ ParameterSlots::Dependence ParameterSlots::dependence_of(const Scene& scene,
   return dependence;
 }
 
-// Of a shape's vertices at the time.
+// The velocities of a shape's vertices at the time, by a parameter of one number.
 std::vector<Vec3d> ParameterSlots::velocities_now(const Scene& scene, const Parameter& parameter,
                                                   uint32_t shape) const {
   Scene copy = deep_copy(scene);

@@ -64,7 +64,8 @@ class ParameterSlots {
   struct ShapeGather {
     std::vector<uint32_t> copies;  // of each vertex that is the first of its copies
     std::optional<ShadingNormalsAdjoint> normals;
-    // What takes derivatives now to those by vertices at the reference time; none: nothing.
+    // Takes derivatives with respect to vertices at the time to those at the reference time; none
+    // without times.
     std::optional<Matrix4> back;
   };
   class Values;

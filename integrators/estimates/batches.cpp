@@ -398,12 +398,12 @@ size_t steps_to_make(Estimators estimators, RunSettings settings) {
   return std::max<size_t>(1, steps);
 }
 
-// Batches have so many times at most: estimators are set up for each. Not tuned.
+// The most times of a batch, since estimators are set up for each. Not tuned.
 constexpr int kMostTimes = 16;
 
-// In [0, 1), for a part of a batch: strata are as wide as their parts' shares of the samples. Where
-// numbers are even in the run, times are, too, if each sample has its own: every second number of
-// such a sequence is not.
+// The time of a part of a batch, in [0, 1): stratified, in strata as wide as the parts' shares of
+// the samples. If numbers are even in the run and each sample has its own time, times are even in
+// the run instead. Larger batches would skip numbers of the sequence: what is left is not even.
 double draw_time(Estimators estimators, const Batch& batch, const Batch& part) {
   const bool even =
       batch.count() <= kMostTimes && std::ranges::any_of(estimators, [](const auto& estimator) {

@@ -129,14 +129,14 @@ struct Zeros {
 };
 
 void Zeros::find(const Quadratic& map, const Triangle& corners, int depth) {
-  constexpr int kDeepest = 10;  // a thousandth of a side: zeros are double ones there
-  constexpr double kEdgeOn = 1e-10;
+  constexpr int kDeepest = 7;        // a hundredth of a side: zeros are double ones there
+  constexpr double kEdgeOn = 1e-10;  // of det J over the square of its size: rounding
   if (!map.may_vanish(far)) return;
   const auto zero = map.zero();
   if (zero) add(corners[0] * zero->x + corners[1] * zero->y + corners[2] * zero->z);
   const auto [low, high] = map.determinants();
   if ((zero && (low >= 0 || high <= 0)) || depth == kDeepest) return;
-  // Edge-on, but for rounding: nothing is met at a single point.
+  // The patch is seen edge-on: it is met nowhere, or along curves, of which no point counts.
   if (std::max(-low, high) <= kEdgeOn * map.extent()) return;
   const Triangle middle = {Vec3d{0, 0.5, 0.5}, Vec3d{0.5, 0, 0.5}, Vec3d{0.5, 0.5, 0}};
   for (int i = 0; i < 4; ++i) {

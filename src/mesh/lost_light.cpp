@@ -1,4 +1,4 @@
-// Light that faces hide from the smooth surface which interpolated normals mean.
+// Light that faces hide from the smooth surface that interpolated normals describe.
 #include "src/mesh/lost_light.h"
 
 #include <array>
@@ -13,8 +13,9 @@ namespace {
 constexpr std::array<std::array<double, 3>, 3> kPoints = {
     {{2.0 / 3, 1.0 / 6, 1.0 / 6}, {1.0 / 6, 2.0 / 3, 1.0 / 6}, {1.0 / 6, 1.0 / 6, 2.0 / 3}}};
 
-// At a tilt of the normal by an angle a, the part (1 - cos a) / 2 lies below the face. Corners that
-// lift the point let it pass beside the face; the others do not.
+// At a tilt of the normal by an angle a, the part (1 - cos a) / 2 of uniform light comes from below
+// the face. It passes where corners lift the point above the face, and is blocked where they do
+// not.
 double lost_at(const std::array<double, 3>& b, const std::array<Vec3d, 3>& corners,
                const std::array<Vec3d, 3>& normals, const Vec3d& n_g, double size) {
   Vec3d x, n_s;

@@ -42,7 +42,8 @@ class CourseRate final : public ExposureNumber {
  public:
   CourseRate(ShapeId shape, bool spins, int axis) : shape_(shape), spins_(spins), axis_(axis) {}
   Moved moved() const override { return {.vertices = shape_.valid(), .camera = !shape_.valid()}; }
-  // Those at the end of the exposure: at the reference time all vertices are at rest.
+  // At the end of the exposure, by which edges that move are found: at the reference time all
+  // vertices are at rest. Derivatives are those of set_time().
   std::vector<Vec3d> velocities(const Scene& scene, ShapeId shape, size_t) const override {
     if (!shape_.valid() || shape != shape_) return {};
     const Vec3d center = scene.exposure->shapes[shape.index()].center;

@@ -56,8 +56,8 @@ struct Exposure {
 // Whether images of the scene are means over times: something moves while the sensor's shutter is
 // open.
 bool is_moving(const Scene& scene);
-// Whether derivatives with respect to the parameters are: it is moving, or one of them makes it
-// move, as the velocity of a shape at rest does.
+// Whether derivatives with respect to the parameters are means over times: the scene is moving, or
+// a parameter makes it move, as the velocity of a shape at rest does.
 bool needs_times(const Scene& scene, std::span<const Parameter> parameters);
 // InputError if they are: `what` cannot take it.
 void check_still(const Scene& scene, const std::string& what,
@@ -67,7 +67,7 @@ void check_still(const Scene& scene, const std::string& what,
 // derivatives that its exposure, vertices and camera have been seeded with. It shares BSDFs,
 // textures and lights with the scene.
 Scene at_time(const Scene& scene, double u);
-// The same in place: from the reference time, once.
+// As at_time(), in place. The scene must be at the reference time.
 void set_time(Scene& scene, double u);
 // Tests once whether faces coincide. If none do, at_time() skips the test at times at which moving
 // shapes are clear of all others. The scene must outlive this knowledge, at its address.

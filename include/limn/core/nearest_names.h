@@ -1,5 +1,5 @@
 #pragma once
-// What a mistyped name may have meant.
+// Suggestions for a mistyped name.
 #include <string>
 #include <vector>
 
