@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Checks derivatives in the scenes of a folder: `limn check`, and the same with --reverse.
 
-    tools/mitsuba/derivatives.py DIR [-o FOLDER] [--only TEXT] [--film N] [--seconds N]
+    tests/mitsuba/derivatives.py DIR [-o FOLDER] [--only TEXT] [--film N] [--seconds N]
         [--minutes N] [--path DIR] [-D name=value] [--at-least N]
 
 Scenes: those that limn opens (census.py), without smooth lobes (edges seen by way of these are
@@ -38,7 +38,7 @@ import time
 
 import numpy as np
 
-sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."))
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "tools"))
 import census  # noqa: E402
 import common  # noqa: E402
 import exr  # noqa: E402

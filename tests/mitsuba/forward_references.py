@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Compares limn's derivative images with those of Mitsuba's own tests, made by differences.
 
-    tools/mitsuba/forward_references.py DIR [--only TEXT] [--spp N] [--write FOLDER]
+    tests/mitsuba/forward_references.py DIR [--only TEXT] [--spp N] [--write FOLDER]
 
 DIR is a clone of mitsuba-data. Its tests/integrators has 28 derivative images; 25 of their scenes
 and thresholds stand in Mitsuba's src/integrators/tests/test_ad_integrators.py, here in limn's
@@ -72,32 +72,21 @@ def camera(size=128, origin=(0, 0, 4), target=(0, 0, 0), fov=None, film=None, **
             **view, **more}
 
 
-def cases():
-    """Name: scene, parameters whose derivatives are added, depth, thresholds; or what hinders."""
+# What several cases have. Their tables are: name: scene, parameters whose derivatives are added,
+# depth, thresholds; or what hinders.
+SKY = {"type": "constant"}
+PLANE = {"type": "rectangle", "bsdf": {"type": "diffuse"}}
+
+
+def matt(*values):
+    return {"type": "diffuse", "reflectance": rgb(*values)}
+
+
+def colours_and_lights():
     right = [("translate", (1.25, 0, 1)), ("rotate", (0, 1, 0), -90)]
     white = {"type": "diffuse", "reflectance": rgb(1)}
-    sky = {"type": "constant"}
-    plane = {"type": "rectangle", "bsdf": {"type": "diffuse"}}
     ball = {"type": "sphere", **placed(("scale", 0.25))}
-    albedo = {"plane": plane, "sphere": ball, "light": sky}
-    small = camera(64)
-    ramp = image("gradient.jpg")
-    clamped = image("gradient.jpg", wrap_mode="clamp")
-    tilted = [("rotate", (1, 0, 0), 45), ("rotate", (0, 0, 1), 90)]
-    under = {"sensor": camera(64, (0, 0.1, 4), (0, 0.1, 0), 18), "plane": square(*tilted),
-             "light": lamp(clamped, **square(("translate", (0, -1.5, 0)), ("rotate", (0, 1, 0), -90),
-                                             ("rotate", (1, 0, 0), -90), ("scale", 4)))}
-    glass = {"type": "roughdielectric", "distribution": "beckmann", "alpha": 0.8, "int_ior": 1.001,
-             "ext_ior": 1.1}
-    sun = lamp(rgb(1000), **mesh("sphere.obj", ("translate", (4, 0, 4)), ("scale", 0.05)))
-    occluder = mesh("sphere.obj", ("translate", (2, 0, 2)), ("scale", 0.25))
-
-    def floor(origin, target, up, *more, **shape):
-        return square(("look_at", origin, target, up), *more, **shape)
-
-    def matt(*values):
-        return {"type": "diffuse", "reflectance": rgb(*values)}
-
+    albedo = {"plane": PLANE, "sphere": ball, "light": SKY}
     return {
         "diffuse_albedo": (albedo, "plane.bsdf.reflectance", 2, 0.015, 0.25),
         "diffuse_albedo_g_i": (
@@ -117,14 +106,28 @@ def cases():
             "light.intensity", 2, 0.02, 0.2),
         "constant_emitter_radiance": (albedo, "light.radiance", 2, 0.02, 0.1),
         "crop_window": (
-            {"plane": plane, "light": sky,
+            {"plane": PLANE, "light": SKY,
              "sensor": camera(64, film={"rfilter": {"type": "gaussian", "stddev": 0.5},
                                         "crop_width": 32, "crop_height": 32, "crop_offset_x": 32,
                                         "crop_offset_y": 20})},
             "plane.bsdf.reflectance", 2, 0.01, 0.2),
+    }
+
+
+def moving_textures():
+    small = camera(64)
+    ramp = image("gradient.jpg")
+    clamped = image("gradient.jpg", wrap_mode="clamp")
+    tilted = [("rotate", (1, 0, 0), 45), ("rotate", (0, 0, 1), 90)]
+    under = {"sensor": camera(64, (0, 0.1, 4), (0, 0.1, 0), 18), "plane": square(*tilted),
+             "light": lamp(clamped, **square(("translate", (0, -1.5, 0)), ("rotate", (0, 1, 0), -90),
+                                             ("rotate", (1, 0, 0), -90), ("scale", 4)))}
+    glass = {"type": "roughdielectric", "distribution": "beckmann", "alpha": 0.8, "int_ior": 1.001,
+             "ext_ior": 1.1}
+    return {
         "rotate_shading_normals_plane": "limn has no parameter for the normals of vertices",
         "translate_textured_plane": (
-            {"sensor": small, "light": sky, "plane": square(("scale", 2), bsdf={
+            {"sensor": small, "light": SKY, "plane": square(("scale", 2), bsdf={
                 "type": "diffuse", "reflectance": image("museum.exr")})},
             "plane.translate.x", 2, 0.1, 56),
         "translate_plane_under_envmap": (
@@ -151,8 +154,20 @@ def cases():
         "translate_plane_under_textured_area_emitter": "the reference is not Mitsuba's any more",
         "translate_textured_area_emitter_illuminating_plane": (
             under, "light.translate.z", 2, 0.025, 0.4),
+    }
+
+
+def moving_shapes():
+    small = camera(64)
+    sun = lamp(rgb(1000), **mesh("sphere.obj", ("translate", (4, 0, 4)), ("scale", 0.05)))
+    occluder = mesh("sphere.obj", ("translate", (2, 0, 2)), ("scale", 0.25))
+
+    def floor(origin, target, up, *more, **shape):
+        return square(("look_at", origin, target, up), *more, **shape)
+
+    return {
         "translate_diffuse_rectangle_constant": (
-            {"rectangle": square(), "light": sky}, "rectangle.translate.x", 2, 0.02, 0.5),
+            {"rectangle": square(), "light": SKY}, "rectangle.translate.x", 2, 0.02, 0.5),
         "translate_rectangle_emitter_on_black": (
             {"light": lamp(rgb(1), **square(("translate", (1.25, 0, 0))))},
             "light.translate.x", 2, 0.03, 1),
@@ -170,7 +185,7 @@ def cases():
             {"sensor": small, "light": lamp(rgb(1), **mesh("sphere.obj"))},
             "light.scale", 2, 0.08, 0.5),
         "translate_occluder_area_light": (
-            {"plane": plane, "occluder": occluder, "light": sun},
+            {"plane": PLANE, "occluder": occluder, "light": sun},
             "occluder.translate.x", 2, 0.03, 1.75),
         "translate_shadow_receiver_area_light": (
             {"plane": square(), "occluder": occluder, "light": sun},
@@ -189,6 +204,10 @@ def cases():
             "wall.translate.z floor.translate.z", 2, 0.01, 0.05),
         "translate_camera": "Mitsuba's test leaves it out: the reference has another filter",
     }
+
+
+def cases():
+    return {**colours_and_lights(), **moving_textures(), **moving_shapes()}
 
 
 def read(file):
