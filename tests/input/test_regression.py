@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""tests/mitsuba/regression.py and derivatives.py on folders that are made here, and, where
+"""tools/mitsuba/regression.py and derivatives.py on folders that are made here, and, where
 MITSUBA_DATA names a clone of mitsuba-data, the first on its tests.
 
     test_regression.py LIMN
@@ -21,7 +21,7 @@ LIMN = sys.argv.pop() if len(sys.argv) > 1 else None
 
 
 def run(tool, folder, *options):
-    tool = os.path.join(ROOT, "tests", "mitsuba", tool)
+    tool = os.path.join(ROOT, "tools", "mitsuba", tool)
     return subprocess.run([sys.executable, tool, folder, "--limn", LIMN, *options],
                           capture_output=True, text=True, check=False)
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Compares limn's derivative images with those of Mitsuba's own tests, made by differences.
 
-    tests/mitsuba/forward_references.py DIR [--only TEXT] [--spp N] [--write FOLDER]
+    tools/mitsuba/forward_references.py DIR [--only TEXT] [--spp N] [--write FOLDER]
 
 DIR is a clone of mitsuba-data. Its tests/integrators has 28 derivative images; 25 of their scenes
 and thresholds stand in Mitsuba's src/integrators/tests/test_ad_integrators.py, here in limn's

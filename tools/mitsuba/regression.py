@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Compares limn's images with the reference images of Mitsuba's own regression tests.
 
-    tests/mitsuba/regression.py DIR [--only TEXT] [--path DIR] [-D name=value] [--at-least N]
+    tools/mitsuba/regression.py DIR [--only TEXT] [--path DIR] [-D name=value] [--at-least N]
 
 DIR is a clone of mitsuba-data, or a folder in it. A scene NAME.xml or NAME_INTEGRATOR.xml counts if
 refs/NAME_ref_rgb.exr and refs/NAME_ref_rgb_var.exr lie beside it: the image, and the variance of

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Counts the scenes of a folder that limn opens, and says why it refuses the others.
 
-    tests/mitsuba/census.py DIR [--path DIR] [-D name=value] [--at-least N]
+    tools/mitsuba/census.py DIR [--path DIR] [-D name=value] [--at-least N]
 
 A scene is an XML file that has a sensor, its own or by `include`, and that no other file includes.
 Each goes through `limn info`. A parameter without a default gets the value of -D, else 16 (path for

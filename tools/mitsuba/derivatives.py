@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Checks derivatives in the scenes of a folder: `limn check`, and the same with --reverse.
 
-    tests/mitsuba/derivatives.py DIR [-o FOLDER] [--only TEXT] [--film N] [--seconds N]
+    tools/mitsuba/derivatives.py DIR [-o FOLDER] [--only TEXT] [--film N] [--seconds N]
         [--minutes N] [--path DIR] [-D name=value] [--at-least N]
 
 Scenes: those that limn opens (census.py), without smooth lobes (edges seen by way of these are

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Renders scenes with limn and with Mitsuba 3 and says whether the images agree.
 
-    tests/mitsuba/compare_with_mitsuba.py SCENE... [-D name=value] [--spp N]
-    tests/mitsuba/compare_with_mitsuba.py --suite [--only TEXT]
+    tools/mitsuba/compare_with_mitsuba.py SCENE... [-D name=value] [--spp N]
+    tools/mitsuba/compare_with_mitsuba.py --suite [--only TEXT]
 
 Each renderer makes SEEDS independent images, and regression.py scores their blocks and their means.
 The suite holds one scene per feature that both renderers have. Needs `pip install mitsuba==3.9.1`.
