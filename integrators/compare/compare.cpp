@@ -27,7 +27,7 @@ class Runner {
   }
 
   // Adds a run to `to`. False if it did not come to its end.
-  bool run(DerivativeMethod& method, size_t budget, int repeat, ComparedMethod& to) {
+  bool run(TimedMethod& method, size_t budget, int repeat, ComparedMethod& to) {
     const double time = options_.times[budget];
     const double before = done_;
     done_ += time;
@@ -58,13 +58,18 @@ class Runner {
     if (settings_.progress) settings_.progress(done_ / total_);
   }
 
-  void add(const DerivativeMethod& method, ComparedRun run, ComparedMethod& to) {
+  void add(const TimedMethod& method, ComparedRun run, ComparedMethod& to) {
     run.errors = image_errors(run.run.image, reference_.image, reference_.variance);
     if (run.repeat == 0) {
       to.image = std::move(run.run.image);
       to.settings = method.settings();
     }
     run.run.image = {};
+    for (const std::string& warning : run.run.warnings) {
+      if (std::ranges::find(to.warnings, warning) == to.warnings.end()) {
+        to.warnings.push_back(warning);
+      }
+    }
     to.runs.push_back(std::move(run));
   }
 
@@ -173,7 +178,7 @@ uint64_t derived_seed(uint64_t seed, const std::string& purpose) {
 }
 
 std::vector<ComparedMethod> compare(const CompareOptions& options, const Reference& reference,
-                                    const std::vector<std::unique_ptr<DerivativeMethod>>& methods,
+                                    const std::vector<std::unique_ptr<TimedMethod>>& methods,
                                     const RunSettings& settings) {
   std::vector<ComparedMethod> results(methods.size());
   for (size_t m = 0; m < methods.size(); ++m) {

@@ -1,12 +1,12 @@
-// A reference from independent runs, and methods in turn against it.
+// Methods of images in a comparison, and a reference from independent runs.
 #include "limn/integrators/compare_images.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <cmath>
-#include <utility>
 
 #include "limn/core/error.h"
-#include "limn/core/rng.h"
+#include "limn/integrators/compare.h"
 #include "limn/integrators/methods.h"
 
 namespace limn {
@@ -14,177 +14,114 @@ namespace {
 
 constexpr int kReferenceRuns = 8;  // whose differences tell their error; not tuned
 
-// The exact film is for those that take it.
-RenderOptions with_method(RenderOptions options, const Method& method) {
-  check_task(method, Task::kImage);
-  options.method = method;
-  if (method->image->looks_around) options.exact_film = false;
-  return options;
-}
-
-// Set-up, a pilot's with it, and one sample of one pixel: InputError if the method does not know
-// the scene.
-void try_method(const Scene& scene, const RunSettings& settings, const RenderOptions& given,
-                const Method& method) {
-  const RenderOptions options = with_method(given, method);
-  RunSettings one = settings;
-  one.progress = nullptr;
-  const NonFinite::SampleId corner{scene.film.crop_x, scene.film.crop_y, 0, ""};
-  trace_sample(scene, one, corner, options);
-}
-
-class ImageComparer {
+class ImageRuns final : public TimedMethod {
  public:
-  ImageComparer(const Scene& scene, const ImageCompareOptions& options, const RunSettings& settings)
-      : scene_(scene), options_(options), settings_(settings) {
-    for (const Method& method : options.methods) {
-      try_method(scene, settings, options.render, method);
-    }
-    result_.reference_method = "rays";
-    try {
-      try_method(scene, settings, options.render, "rays");
-    } catch (const InputError& error) {
-      result_.reference_method = "path";
-      result_.not_by_rays = error.what();
-    }
-    double once = 0;
-    for (const double time : options.times) once += time;
-    all_seconds_ = options.reference_seconds +
-                   once * options.repeats * static_cast<double>(options.methods.size());
+  ImageRuns(const Scene& scene, RenderOptions options, const Method& method, int block)
+      : scene_(scene), options_(std::move(options)), block_(block) {
+    check_task(method, Task::kImage);
+    options_.method = method;
+    if (looks_around()) options_.exact_film = false;
   }
 
-  ImageComparison run() {
-    if (make_reference()) {
-      for (const double time : options_.times) compare_at(time);
-      std::stable_sort(result_.rows.begin(), result_.rows.end(),
-                       [&](const ComparedImage& a, const ComparedImage& b) {
-                         return place(a.method) < place(b.method);
-                       });
+  // Set-up, a pilot's with it, and one sample of one pixel.
+  void try_once(RunSettings settings) const {
+    settings.progress = nullptr;
+    const NonFinite::SampleId corner{scene_.film.crop_x, scene_.film.crop_y, 0, ""};
+    trace_sample(scene_, settings, corner, options_);
+  }
+
+  std::string name() const override { return options_.method.name(); }
+  std::string description() const override { return options_.method->description; }
+
+  MethodRun run(const RunSettings& settings) override {
+    RenderResult result = render(scene_, settings, options_);
+    MethodRun run;
+    run.spp = result.spp;
+    if (run.spp == 0) return run;
+    const Film& film = scene_.film;
+    run.image = means(result.radiance);
+    run.blocks.sums = sum_blocks(run.image, film.crop_width, film.crop_height, block_);
+    run.seconds = result.seconds;
+    run.rays = result.rays;
+    run.non_finite = result.non_finite;
+    run.warnings = std::move(result.warnings);
+    return run;
+  }
+
+  std::vector<MethodSetting> settings() const override {
+    if (options_.method->image->by_lines) {
+      return {{"lines", double(options_.lines)}, {"tolerance", options_.tolerance}};
     }
-    if (settings_.progress && !stopped()) settings_.progress(1);
-    return std::move(result_);
+    if (looks_around()) return {{"rays", double(options_.rays)}};
+    return {{"generator", options_.generator}, {"film", options_.exact_film ? "exact" : "rays"}};
   }
 
  private:
-  bool stopped() const { return settings_.interrupted && settings_.interrupted->load(); }
-  size_t place(const std::string& method) const {
-    return std::ranges::find(options_.methods, method, &Method::name) - options_.methods.begin();
-  }
-
-  RenderResult one(const RenderOptions& options, double seconds, uint64_t number) {
-    RunSettings settings = settings_;
-    settings.spp = 1 << 30;
-    settings.seconds = seconds;
-    settings.seed = mix_bits(mix_bits(settings_.seed + 0x5eed) + number);
-    if (settings_.progress) {
-      const double from = done_ / all_seconds_, share = seconds / all_seconds_;
-      settings.progress = [this, from, share](double part) {
-        // The bar ends its line at 1.
-        settings_.progress(std::min(from + share * part, 0.9999));
-      };
-    }
-    RenderResult result = render(scene_, settings, options);
-    result_.non_finite.merge(result.non_finite);
-    for (const std::string& warning : result.warnings) {
-      const auto& told = result_.warnings;
-      const std::string line = options.method.name() + ": " + warning;
-      if (std::find(told.begin(), told.end(), line) == told.end()) {
-        result_.warnings.push_back(line);
-      }
-    }
-    done_ += seconds;
-    return result;
-  }
-
-  bool make_reference() {
-    std::vector<std::vector<double>> runs;
-    RenderOptions options = with_method(options_.render, result_.reference_method);
-    options.exact_film = false;
-    for (int k = 0; k < kReferenceRuns; ++k) {
-      const RenderResult run = one(options, options_.reference_seconds / kReferenceRuns, k);
-      if (stopped()) return false;
-      runs.push_back(means(run.radiance));
-      result_.reference_spp += static_cast<int>(run.spp);
-    }
-    reference_ = mean_of_runs(runs);
-    if (!(reference_.scale > 0)) {
-      throw InputError({scene_.file}, "its image is black: nothing to compare");
-    }
-    result_.reference = reference_.mean;
-    result_.reference_squared_error = reference_.squared_error / reference_.scale;
-    return true;
-  }
-
-  void compare_at(double time) {
-    std::vector<ComparedImage> rows(options_.methods.size());
-    std::vector<std::vector<double>> errors(rows.size());
-    for (int repeat = 0; repeat < options_.repeats; ++repeat) {
-      for (size_t m = 0; m < rows.size(); ++m) {
-        const RenderResult run =
-            one(with_method(options_.render, options_.methods[m]), time, ++number_);
-        if (stopped()) break;
-        rows[m].image = means(run.radiance);
-        rows[m].seconds += run.seconds;
-        rows[m].spp += static_cast<double>(run.spp);
-        errors[m].push_back(relative_squared_error(rows[m].image, reference_));
-      }
-      if (stopped()) break;
-    }
-    for (size_t m = 0; m < rows.size(); ++m) {
-      ComparedImage& row = rows[m];
-      const auto count = static_cast<double>(errors[m].size());
-      if (count == 0) continue;
-      row.method = options_.methods[m].name();
-      row.time = time;
-      row.seconds /= count;
-      row.spp /= count;
-      double squares = 0;
-      for (const double e : errors[m]) row.squared_error += e / count;
-      for (const double e : errors[m]) {
-        squares += (e - row.squared_error) * (e - row.squared_error);
-      }
-      if (count > 1) row.squared_error_stderr = std::sqrt(squares / (count * (count - 1)));
-      result_.rows.push_back(std::move(row));
-    }
-  }
+  bool looks_around() const { return options_.method->image->looks_around; }
 
   const Scene& scene_;
-  const ImageCompareOptions& options_;
-  const RunSettings& settings_;
-  ImageComparison result_;
-  ReferenceImage reference_;
-  double all_seconds_ = 0, done_ = 0;
-  uint64_t number_ = 1000;
+  RenderOptions options_;
+  int block_;
 };
+
+// Mean and variance of the mean, number by number.
+void average(const std::vector<std::vector<double>>& runs, std::vector<double>& mean,
+             std::vector<double>& variance) {
+  std::vector<double> values(runs.size());
+  for (size_t i = 0; i < runs[0].size(); ++i) {
+    for (size_t k = 0; k < runs.size(); ++k) values[k] = runs[k][i];
+    const Uncertain all = mean_of_repeats(values);
+    mean.push_back(all.value);
+    variance.push_back(all.error * all.error);
+  }
+}
 
 }  // namespace
 
-ReferenceImage mean_of_runs(const std::vector<std::vector<double>>& runs) {
-  const auto count = static_cast<double>(runs.size());
-  ReferenceImage reference;
-  reference.mean.resize(runs.at(0).size());
-  for (size_t i = 0; i < reference.mean.size(); ++i) {
-    double& mean = reference.mean[i];
-    for (const std::vector<double>& run : runs) mean += run[i] / count;
-    reference.scale += mean * mean;
-    for (const std::vector<double>& run : runs) {
-      reference.squared_error += (run[i] - mean) * (run[i] - mean) / (count * (count - 1));
+std::unique_ptr<TimedMethod> make_image_method(const Scene& scene, RenderOptions options,
+                                               const Method& method, int block,
+                                               const RunSettings& settings) {
+  auto runs = std::make_unique<ImageRuns>(scene, std::move(options), method, block);
+  runs->try_once(settings);
+  return runs;
+}
+
+Reference make_image_reference(const Scene& scene, RenderOptions options, int block,
+                               const RunSettings& settings, std::string& not_by_rays) {
+  options.exact_film = false;
+  std::unique_ptr<TimedMethod> method;
+  try {
+    method = make_image_method(scene, options, "rays", block, settings);
+  } catch (const InputError& error) {
+    not_by_rays = error.what();
+    method = make_image_method(scene, options, "path", block, settings);
+  }
+  Reference reference;
+  std::vector<std::vector<double>> images, blocks;
+  for (int k = 0; k < kReferenceRuns; ++k) {
+    RunSettings part = settings;
+    part.seconds /= kReferenceRuns;
+    part.seed = derived_seed(settings.seed, fmt::format("part {}", k));
+    if (settings.progress) {
+      part.progress = [&](double done) { settings.progress((k + done) / kReferenceRuns); };
     }
+    MethodRun run = method->run(part);
+    if (run.spp == 0 || (settings.interrupted && settings.interrupted->load())) return {};
+    images.push_back(std::move(run.image));
+    blocks.push_back(std::move(run.blocks.sums));
+    reference.spp += run.spp;
+    reference.seconds += run.seconds;
+    reference.non_finite.merge(run.non_finite);
   }
-  return reference;
-}
-
-double relative_squared_error(const std::vector<double>& image, const ReferenceImage& reference) {
-  double sum = 0;
-  for (size_t i = 0; i < image.size(); ++i) {
-    sum += (image[i] - reference.mean[i]) * (image[i] - reference.mean[i]);
-  }
-  return (sum - reference.squared_error) / reference.scale;
-}
-
-ImageComparison compare_images(const Scene& scene, const ImageCompareOptions& options,
-                               const RunSettings& settings) {
-  return ImageComparer(scene, options, settings).run();
+  average(images, reference.image, reference.variance);
+  average(blocks, reference.blocks.sums, reference.blocks.variances);
+  reference.blocks.degrees = kReferenceRuns - 1;
+  reference.edges.resize(blocks[0].size());
+  reference.method = method->name();
+  reference.seed = settings.seed;
+  reference.asked_seconds = settings.seconds;
+  if (mean_square(reference.image) > 0) return reference;
+  throw InputError({scene.file}, "its image is black: nothing to compare");
 }
 
 }  // namespace limn

@@ -22,9 +22,9 @@ const std::string kFile = "half_hidden_lamp.xml";
 const std::string kParameter = "lamp.translate.x";
 
 // The same run whatever a machine does in the time: a number of samples instead of seconds.
-class CountedMethod final : public DerivativeMethod {
+class CountedMethod final : public TimedMethod {
  public:
-  CountedMethod(std::unique_ptr<DerivativeMethod> method, int spp)
+  CountedMethod(std::unique_ptr<TimedMethod> method, int spp)
       : method_(std::move(method)), spp_(spp) {}
   std::string name() const override { return method_->name(); }
   std::string description() const override { return method_->description(); }
@@ -36,7 +36,7 @@ class CountedMethod final : public DerivativeMethod {
   }
 
  private:
-  std::unique_ptr<DerivativeMethod> method_;
+  std::unique_ptr<TimedMethod> method_;
   int spp_;
 };
 
@@ -53,9 +53,9 @@ struct Job {
     run.seed = derived_seed(settings.seed, "reference");
     return make_reference(input, run);
   }
-  std::vector<std::unique_ptr<DerivativeMethod>> methods(const std::vector<std::string>& names,
-                                                         int spp) const {
-    std::vector<std::unique_ptr<DerivativeMethod>> made;
+  std::vector<std::unique_ptr<TimedMethod>> methods(const std::vector<std::string>& names,
+                                                    int spp) const {
+    std::vector<std::unique_ptr<TimedMethod>> made;
     for (const std::string& name : names) {
       made.push_back(std::make_unique<CountedMethod>(make_method(input, name), spp));
     }
@@ -113,7 +113,7 @@ TEST(Compare, FindsABias) {
 }
 
 // What a method was asked, and an image with a known error.
-class KnownMethod final : public DerivativeMethod {
+class KnownMethod final : public TimedMethod {
  public:
   KnownMethod(std::string name, double error, std::vector<RunSettings>& log)
       : name_(std::move(name)), error_(error), log_(log) {}
@@ -140,7 +140,7 @@ class KnownMethod final : public DerivativeMethod {
   std::vector<RunSettings>& log_;
 };
 
-class MissingMethod final : public DerivativeMethod {
+class MissingMethod final : public TimedMethod {
  public:
   std::string name() const override { return "absent"; }
   std::string description() const override { return "not there"; }
@@ -160,7 +160,7 @@ Reference known_reference() {
 TEST(Compare, InterleavesWithSeedsOfTheirOwn) {
   KnownMethod::names.clear();
   std::vector<RunSettings> log;
-  std::vector<std::unique_ptr<DerivativeMethod>> methods;
+  std::vector<std::unique_ptr<TimedMethod>> methods;
   methods.push_back(std::make_unique<KnownMethod>("a", 0.1, log));
   methods.push_back(std::make_unique<MissingMethod>());
   methods.push_back(std::make_unique<KnownMethod>("b", 0.2, log));
@@ -220,7 +220,7 @@ TEST(Compare, SeesABias) {
   settings.seed = 5;
   settings.spp = 32768;
   const Reference reference = make_reference(input, settings);
-  std::vector<std::unique_ptr<DerivativeMethod>> methods;
+  std::vector<std::unique_ptr<TimedMethod>> methods;
   for (const char* name : {"forest", "was"}) {
     methods.push_back(std::make_unique<CountedMethod>(make_method(input, name), 8192));
   }

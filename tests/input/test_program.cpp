@@ -136,7 +136,7 @@ TEST_F(Program, Compares) {
     }
   }
   EXPECT_TRUE(first["methods"][1]["settings"]["step"].is_number());
-  for (const char* file : {"compare.csv", "image.png", "reference.png", "reference_stderr.exr"}) {
+  for (const char* file : {"image.png", "reference.png", "reference_stderr.exr"}) {
     EXPECT_TRUE(std::filesystem::exists(folder + "/" + file)) << file;
   }
 
@@ -148,6 +148,30 @@ TEST_F(Program, Compares) {
                             files_.path("other") + " --reference " + folder + "/reference.exr";
   const std::string text = refused(other + " --methods forest");
   EXPECT_NE(text.find("parameter: \"screen.translate.x\" there"), std::string::npos) << text;
+}
+
+TEST_F(Program, ComparesImages) {
+  const std::string folder = files_.path("folder");
+  const std::string compare = "compare " + scene_ +
+                              " --image --what direct --time 0.05 --reference-time 0.1" +
+                              " --repeats 2 -o " + folder + " --methods path,rays";
+  const Outcome outcome = run(compare);
+  EXPECT_EQ(outcome.status, 0) << outcome.text;
+  EXPECT_NE(outcome.text.find("error of path, over its time"), std::string::npos) << outcome.text;
+  std::ifstream stream(folder + "/compare.json");
+  const nlohmann::json report = nlohmann::json::parse(stream);
+  EXPECT_EQ(report["kind"], "compare_images");
+  EXPECT_EQ(report["what"], "direct");
+  ASSERT_EQ(report["methods"].size(), 2u);
+  for (const nlohmann::json& method : report["methods"]) {
+    EXPECT_EQ(method["status"], "done");
+    EXPECT_EQ(method["runs"].size(), 2u);
+    for (const char* key : {"image", "picture", "error_picture"}) {
+      EXPECT_TRUE(std::filesystem::exists(folder + "/" + method[key].get<std::string>())) << key;
+    }
+  }
+  const Outcome again = run(compare + " --reference " + folder + "/reference.exr");
+  EXPECT_NE(again.text.find("(kept)"), std::string::npos) << again.text;
 }
 
 // A Python that cannot start is as good as none.
@@ -199,7 +223,6 @@ TEST_F(Program, OptionsOfOthersAreRefused) {
            {fields + " --what ao", "--what"},
            {fields + " --rays 2", "--rays"},
            {images + " --methods rays --lines 2", "--lines"},
-           {images + " --methods path --reference x.exr", "--reference"},
            {images + " --methods path --no-report", "--no-report"},
            {images + " --methods rays,silhouettes,lines --film exact", "--film exact"},
            {"render " + scene_ + " --method lines --film exact -o " + out(), "--film"}}) {

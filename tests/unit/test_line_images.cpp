@@ -8,6 +8,7 @@
 #include "integrators/contours/line_light.h"
 #include "integrators/lights/split_environment.h"
 #include "limn/core/error.h"
+#include "limn/integrators/compare.h"
 #include "limn/integrators/compare_images.h"
 #include "limn/integrators/parts.h"
 #include "support/over_floor.h"
@@ -225,64 +226,68 @@ TEST(LineImages, SaysWhatItDoesNotKnow) {
   EXPECT_NE(refused(deep, ao).find("say silhouettes, lines, rays"), std::string::npos);
 }
 
-// Rows of all methods and times, whatever the clock gives each of them.
-TEST(CompareImages, Rows) {
+// Runs of all methods and times, whatever the clock gives each of them.
+TEST(CompareImages, Runs) {
   const TempFiles files;
   const Scene scene =
       over_floor(files, {{torus_mesh(16, 8), 0.8, {0.2, 1.1, 0}}}, false,
                  square("lamp", 0.6, 90, {0.4, 2.9, 0.3}, area_light("glow", "9, 8, 7")));
-  ImageCompareOptions options;
-  options.methods = {"path", "rays", "silhouettes"};
-  options.times = {0.001, 0.01};
-  options.repeats = 2;
-  options.reference_seconds = 0.01;
   RunSettings settings;
   settings.seed = 5;
-  const ImageComparison result = compare_images(scene, options, settings);
-  EXPECT_EQ(result.reference_method, "rays");
-  EXPECT_EQ(result.not_by_rays, "");
-  EXPECT_GE(result.reference_spp, 8);
-  ASSERT_EQ(result.rows.size(), 6u);
-  for (int m = 0; m < 3; ++m) {
-    for (int t = 0; t < 2; ++t) {
-      const ComparedImage& row = result.rows[2 * m + t];
-      EXPECT_EQ(row.method, options.methods[m].name());
-      EXPECT_EQ(row.time, options.times[t]);
-      EXPECT_GE(row.spp, 1);
-      EXPECT_EQ(row.image.size(), result.reference.size());
+  settings.spp = 1 << 30;
+  settings.seconds = 0.01;
+  std::string not_by_rays;
+  const Reference reference = make_image_reference(scene, {}, 4, settings, not_by_rays);
+  EXPECT_EQ(reference.method, "rays");
+  EXPECT_EQ(not_by_rays, "");
+  EXPECT_GE(reference.spp, 8);
+  std::vector<std::unique_ptr<TimedMethod>> methods;
+  for (const char* name : {"path", "rays", "silhouettes"}) {
+    methods.push_back(make_image_method(scene, {}, Method(name), 4, settings));
+  }
+  const auto compared = compare({{0.001, 0.01}, 2}, reference, methods, settings);
+  ASSERT_EQ(compared.size(), 3u);
+  for (size_t m = 0; m < 3; ++m) {
+    EXPECT_EQ(compared[m].name, methods[m]->name());
+    EXPECT_EQ(compared[m].status, MethodStatus::kDone);
+    EXPECT_EQ(compared[m].image.size(), reference.image.size());
+    ASSERT_EQ(compared[m].summary.size(), 2u);
+    for (const BudgetSummary& summary : compared[m].summary) {
+      EXPECT_GE(summary.spp, 1);
+      EXPECT_GT(summary.bias.count, 0);
     }
   }
   Scene shiny = over_floor(files, {}, false, constant_light("sky", "1, 1, 1"));
   shiny.max_depth = 3;
-  options.methods = {"path"};
-  const ImageComparison by_paths = compare_images(shiny, options, settings);
-  EXPECT_EQ(by_paths.reference_method, "path");
-  EXPECT_NE(by_paths.not_by_rays.find("max_depth"), std::string::npos);
-  options.methods = {"path", "forest"};
-  EXPECT_THROW(compare_images(scene, options, settings), InputError);
+  EXPECT_EQ(make_image_reference(shiny, {}, 4, settings, not_by_rays).method, "path");
+  EXPECT_NE(not_by_rays.find("max_depth"), std::string::npos);
+  EXPECT_THROW(make_image_method(scene, {}, Method("forest"), 4, settings), InputError);
+  EXPECT_THROW(make_image_method(shiny, {}, Method("rays"), 4, settings), InputError);
 }
 
-// Images of known variance: what the reference's own error adds is taken out.
-TEST(CompareImages, ErrorsOfKnownVariance) {
-  Rng rng(3, 1, 4);
-  const auto image = [&](double sigma) {
-    std::vector<double> values(3000);
-    for (double& x : values) x = 2 + sigma * std::sqrt(12) * (rng.uniform() - 0.5);
-    return values;
-  };
-  RunningMean own, same, better;
-  for (int i = 0; i < 200; ++i) {
-    std::vector<std::vector<double>> runs;
-    for (int k = 0; k < 4; ++k) runs.push_back(image(0.2));
-    const ReferenceImage reference = mean_of_runs(runs);
-    own.add(reference.squared_error / reference.scale);
-    same.add(relative_squared_error(image(0.2), reference));
-    better.add(relative_squared_error(image(0), reference));
+// What the reference says of its own error is what image_errors() takes out: methods of the same
+// samples have the error that their variance makes, and blocks are unbiased.
+TEST(CompareImages, ErrorsOfReferences) {
+  const TempFiles files;
+  const Scene scene =
+      over_floor(files, {{torus_mesh(16, 8), 0.8, {0.2, 1.1, 0}}}, false,
+                 square("lamp", 0.6, 90, {0.4, 2.9, 0.3}, area_light("glow", "9, 8, 7")));
+  RunSettings settings;
+  settings.spp = 2;  // of each of the eight runs, and of one run of the method
+  RunningMean difference;
+  for (int seed = 0; seed < 40; ++seed) {
+    settings.seed = 2 * static_cast<uint64_t>(seed);
+    std::string not_by_rays;
+    const Reference reference = make_image_reference(scene, {}, 4, settings, not_by_rays);
+    EXPECT_EQ(reference.spp, 16);
+    ++settings.seed;
+    const auto method = make_image_method(scene, {}, Method("rays"), 4, settings);
+    const MethodRun run = method->run(settings);
+    // The method's variance is eight times the reference's.
+    const double mse = image_errors(run.image, reference.image, reference.variance).mse;
+    difference.add(mse - 8 * mean_of(reference.variance));
   }
-  // Of 4, scale adding its own noise in the fifth digit.
-  EXPECT_LT(std::fabs(own.z_score(0.01 / 4 / (1 + 0.01 / 4))), 4);
-  EXPECT_LT(std::fabs(same.z_score(0.01 / (1 + 0.01 / 4))), 4);
-  EXPECT_LT(std::fabs(better.z_score(0)), 4);
+  EXPECT_LT(std::fabs(difference.z_score(0)), 4);
 }
 
 }  // namespace

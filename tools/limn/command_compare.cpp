@@ -7,10 +7,10 @@
 #include "limn/core/names.h"
 #include "limn/core/parallel.h"
 #include "limn/core/parameter.h"
+#include "limn/integrators/compare_images.h"
 #include "limn/integrators/methods.h"
 #include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
-#include "tools/limn/compare_images.h"
 #include "tools/limn/compare_output.h"
 #include "tools/limn/output_files.h"
 #include "tools/limn/report_script.h"
@@ -46,6 +46,16 @@ std::vector<std::string> own_names(const std::vector<std::string>& names) {
     if (!is_mitsuba(name)) own.push_back(name);
   }
   return own;
+}
+
+void check_methods_of_images(const CLI::App& app, const CompareArguments& command) {
+  std::vector<Method> methods = parse_methods(command.methods, Task::kImage);
+  const auto takes_film = [](const Method& method) { return !method->image->looks_around; };
+  if (command.render.exact_film && std::ranges::none_of(methods, takes_film)) {
+    throw InputError("--film exact: none of --methods takes it; path and analytic do");
+  }
+  methods.emplace_back("rays");  // makes the reference
+  check_image_options(app, methods);
 }
 
 // Before any work.
@@ -138,8 +148,8 @@ class Comparer {
         scene_(scene),
         settings_(settings),
         input_{scene,
-               command.parameter,
-               command.gradient.terms,
+               command.images ? "image" : command.parameter,
+               command.images ? std::vector{what()} : command.gradient.terms,
                command.gradient.step,
                block_size(scene.film),
                parse_samples(command.samples),
@@ -149,8 +159,12 @@ class Comparer {
         kept_file_((fs::path(command.output) / "reference.exr").string()) {
     result_.command = command_line;
     result_.defines = common.defines;
-    result_.parameter = command.parameter;
-    result_.unit = find_parameter(scene, command.parameter).unit;
+    result_.parameter = input_.parameter;
+    if (command.images) {
+      result_.what = what();
+    } else {
+      result_.unit = find_parameter(scene, command.parameter).unit;
+    }
     result_.terms = input_.terms.empty() ? "all" : fmt::format("{}", fmt::join(input_.terms, ","));
     result_.seed = settings.seed;
     result_.threads = settings.threads;
@@ -159,11 +173,7 @@ class Comparer {
     for (const double time : result_.options.times) runs += time * command.repeats;
     reference_seconds_ = command.reference_time > 0 ? command.reference_time : 4 * runs;
     methods_seconds_ = runs * static_cast<double>(command.methods.size());
-    for (const std::string& name : command.methods) {
-      methods_.push_back(is_mitsuba(name)
-                             ? make_mitsuba_method(name, input_, common.defines, command.output)
-                             : make_method(input_, name));
-    }
+    for (const std::string& name : command.methods) methods_.push_back(method_of(name));
     take_reference();
   }
   Comparer(const Comparer&) = delete;
@@ -172,10 +182,13 @@ class Comparer {
   // False if interrupted before there is something to write.
   bool run() {
     const bool made = result_.reference.spp == 0;
-    Stages stages(settings_, command_.time + methods_seconds_ + (made ? reference_seconds_ : 0));
-    RunSettings image = stages.next(command_.time);
-    image.spp = kImageSamples;
-    result_.image = render(scene_, image);
+    const double image_seconds = command_.images ? 0 : command_.time;
+    Stages stages(settings_, image_seconds + methods_seconds_ + (made ? reference_seconds_ : 0));
+    if (!command_.images) {
+      RunSettings image = stages.next(image_seconds);
+      image.spp = kImageSamples;
+      result_.image = render(scene_, image);
+    }
     const bool ready = !made || make_reference_file(stages.next(reference_seconds_));
     if (ready) {
       result_.methods =
@@ -191,6 +204,13 @@ class Comparer {
   }
 
   const Comparison& result() const { return result_; }
+  std::vector<std::string> warnings() const {
+    std::vector<std::string> all;
+    for (const ComparedMethod& m : result_.methods) {
+      for (const std::string& warning : m.warnings) all.push_back(m.name + ": " + warning);
+    }
+    return all;
+  }
 
   NonFinite non_finite() const {
     NonFinite all = result_.image.non_finite;
@@ -202,6 +222,18 @@ class Comparer {
   }
 
  private:
+  std::string what() const { return kRenderWhat[static_cast<int>(command_.render.what)]; }
+
+  std::unique_ptr<TimedMethod> method_of(const std::string& name) const {
+    if (command_.images) {
+      return make_image_method(scene_, command_.render, name, input_.block, settings_);
+    }
+    if (is_mitsuba(name)) {
+      return make_mitsuba_method(name, input_, common_.defines, command_.output);
+    }
+    return make_method(input_, name);
+  }
+
   // Reads the reference, if there is one to read.
   void take_reference() {
     const Film& film = scene_.film;
@@ -226,7 +258,10 @@ class Comparer {
   bool make_reference_file(RunSettings settings) {
     settings.spp = 1 << 30;
     settings.seed = derived_seed(settings_.seed, "reference");
-    result_.reference = make_reference(input_, settings);
+    result_.reference = command_.images
+                            ? make_image_reference(scene_, command_.render, input_.block, settings,
+                                                   result_.not_by_rays)
+                            : make_reference(input_, settings);
     if (result_.reference.spp < 2) return false;
     write_reference(kept_file_, result_.reference, identity_, scene_.film, input_.block);
     return true;
@@ -240,7 +275,7 @@ class Comparer {
   Identity identity_;
   std::string kept_file_;  // the reference's place in the folder
   double reference_seconds_ = 0, methods_seconds_ = 0;
-  std::vector<std::unique_ptr<DerivativeMethod>> methods_;
+  std::vector<std::unique_ptr<TimedMethod>> methods_;
   Comparison result_;
 };
 
@@ -254,7 +289,8 @@ class CompareCommand final : public Command {
   int run(const std::string& command_line) override;
 
  private:
-  int run_images(const std::string& command_line);
+  void check_images();
+  std::vector<Method> check_derivatives() const;
 
   CommonOptions common_;
   CompareArguments command_;
@@ -316,35 +352,15 @@ void CompareCommand::add_options(CLI::App& app) {
       "--no-report", [this] { command_.report = false; }, "Write no report.html");
 }
 
-int CompareCommand::run_images(const std::string& command_line) {
-  refuse_options(
-      *app_, {"--reference", "--terms", "--samples", "--step", "--aux", "--kappa", "--no-report"},
-      "derivatives alone have that: not with --image");
-  // The reference is made by rays.
+void CompareCommand::check_images() {
+  refuse_options(*app_, {"--terms", "--samples", "--step", "--aux", "--kappa", "--no-report"},
+                 "derivatives alone have that: not with --image");
   command_.render.exact_film = command_.gradient.exact_film;
-  const std::vector<Method> methods = parse_methods(command_.methods, Task::kImage);
-  std::vector<Method> with_reference = methods;
-  with_reference.emplace_back("rays");
-  check_image_options(*app_, with_reference);
-  if (command_.render.exact_film) check_exact_film(methods);
-  if (common_.run.spp) {
-    throw InputError("--spp: methods are compared at equal time: say how long with --time");
-  }
-  Warnings warnings;
-  const Scene scene = load_scene(common_, warnings);
-  make_folder(command_.output);
-  check_outputs(
-      {{"-o", (fs::path(command_.output) / "compare.json").string()}, {"--json", common_.json}},
-      scene);
-  return compare_images_command(common_,
-                                {methods, command_.render, make_options(command_).times,
-                                 command_.repeats, command_.reference_time, command_.output},
-                                scene, make_settings(common_, scene, name()), warnings,
-                                command_line);
+  command_.report = false;
+  check_methods_of_images(*app_, command_);
 }
 
-int CompareCommand::run(const std::string& command_line) {
-  if (command_.images) return run_images(command_line);
+std::vector<Method> CompareCommand::check_derivatives() const {
   refuse_options(*app_, {"--what", "--lines", "--tolerance", "--rays"},
                  "images alone have that: only with --image");
   if (command_.parameter.empty()) {
@@ -352,13 +368,25 @@ int CompareCommand::run(const std::string& command_line) {
   }
   const std::vector<Method> methods = check_methods(command_.methods, command_.gradient.terms);
   check_warp(command_.gradient.warp, methods);
+  return methods;
+}
+
+int CompareCommand::run(const std::string& command_line) {
+  std::vector<Method> methods;
+  if (command_.images) {
+    check_images();
+  } else {
+    methods = check_derivatives();
+  }
   if (common_.run.spp) {
     throw InputError("--spp: methods are compared at equal time: say how long with --time");
   }
   Warnings warnings;
   const Scene scene = load_scene(common_, warnings);
-  find_parameter(scene, command_.parameter);
-  if (command_.gradient.exact_film) check_exact_films(scene, methods);
+  if (!command_.images) {
+    find_parameter(scene, command_.parameter);
+    if (command_.gradient.exact_film) check_exact_films(scene, methods);
+  }
   make_folder(command_.output);
   check_outputs(
       {{"-o", (fs::path(command_.output) / "compare.json").string()}, {"--json", common_.json}},
@@ -369,6 +397,7 @@ int CompareCommand::run(const std::string& command_line) {
     fmt::print(stderr, "interrupted before there was a reference: nothing is written\n");
     return kInterrupted;
   }
+  warnings.add_all(comparer.warnings());
   comparer.write(warnings.lines());
   if (!common_.quiet) print_comparison(comparer.result());
   copy_json((fs::path(command_.output) / "compare.json").string(), common_.json);

@@ -2,12 +2,10 @@
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
-#include <set>
 
 #include "limn/core/parallel.h"
 #include "limn/core/parameter.h"
-#include "limn/edgetree/crossing_curves.h"
-#include "limn/edgetree/edges.h"
+#include "limn/integrators/scene_info.h"
 #include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
 
@@ -15,29 +13,6 @@ namespace limn {
 namespace {
 
 using nlohmann::json;
-
-json describe_shape(const Scene& scene, ShapeId id) {
-  const Shape& shape = scene.shape(id);
-  const EdgeMesh edges = build_edge_mesh(shape.mesh, shape.bsdf->side(false) == nullptr);
-  const Bounds bounds = bounds_of(shape.mesh);
-  constexpr const char* kNormals[] = {"face", "computed", "from the file"};
-  const auto vector = [](const Vec3d& v) { return json::array({v.x, v.y, v.z}); };
-  return {{"name", shape.id},
-          {"faces", shape.mesh.faces.size()},
-          {"vertices", shape.mesh.positions.size()},
-          {"collapsed_faces", shape.mesh.collapsed_faces},
-          {"normals", kNormals[static_cast<int>(shape.mesh.normal_source)]},
-          {"bounds", {vector(bounds.lower), vector(bounds.upper)}},
-          {"edges",
-           {{"smooth", edges.count(EdgeClass::kSmooth)},
-            {"sharp", edges.count(EdgeClass::kSharp)},
-            {"border", edges.count(EdgeClass::kBoundary)},
-            {"irregular", edges.count(EdgeClass::kIrregular)},
-            {"flat", edges.count(EdgeClass::kFlat)}}},
-          {"closed", edges.count(EdgeClass::kBoundary) + edges.count(EdgeClass::kIrregular) == 0},
-          {"bsdf", shape.bsdf->describe()},
-          {"emitter", shape.is_emitter}};
-}
 
 void print_shape(const json& shape) {
   const json& edges = shape["edges"];
@@ -86,17 +61,6 @@ void print_parameter(const Parameter& parameter) {
   fmt::print("  {}  [{}]{}\n", parameter.name, parameter.unit, parts);
 }
 
-json describe_crossings(const Scene& scene, std::span<const Mesh* const> meshes,
-                        std::span<const FacePair> pairs, int threads) {
-  const std::vector<IntersectionSegment> segments = find_intersections(meshes, pairs, threads);
-  std::set<ShapeId> shapes;
-  for (const IntersectionSegment& segment : segments)
-    for (const FaceRef face : segment.faces) shapes.insert(face.shape);
-  json names = json::array();
-  for (const ShapeId shape : shapes) names.push_back(scene.shape(shape).id);
-  return {{"segments", segments.size()}, {"shapes", names}};
-}
-
 void print_crossings(const json& crossings) {
   const size_t segments = crossings["segments"];
   if (segments == 0) return;
@@ -110,36 +74,18 @@ int run_info(const CommonOptions& common) {
   print_camera(scene);
   if (scene.sensors.size() > 1) fmt::print("sensors (for --sensor): {}\n", sensor_names(scene));
   fmt::print("shapes: {}\n", scene.shapes.size());
-  json report = {{"scene", scene.file},
-                 {"shapes", json::array()},
-                 {"lights", json::array()},
-                 {"parameters", json::array()},
-                 {"sensors", json::array()}};
-  for (const Sensor& sensor : scene.sensors) report["sensors"].push_back(sensor.id);
-  for (uint32_t i = 0; i < scene.shapes.size(); ++i) {
-    report["shapes"].push_back(describe_shape(scene, ShapeId(i)));
-    print_shape(report["shapes"].back());
-  }
+  json info = json::parse(scene_info(scene, thread_count(common.run.threads)));
+  for (const json& shape : info["shapes"]) print_shape(shape);
   fmt::print("environment: {}\n",
              scene.environment ? scene.environment->describe() : std::string("none"));
   for (const auto& light : scene.delta_lights) {
-    report["lights"].push_back({{"name", light->id}, {"light", light->describe()}});
     fmt::print("light {}: {}\n", light->id, light->describe());
   }
-  std::vector<const Mesh*> meshes;
-  for (const Shape& shape : scene.shapes) meshes.push_back(&shape.mesh);
-  const int threads = thread_count(common.run.threads);
-  const std::vector<FacePair> pairs = find_face_pairs(meshes, value(scene.camera.origin), threads);
-  report["crossings"] = describe_crossings(scene, meshes, pairs, threads);
-  print_crossings(report["crossings"]);
+  print_crossings(info["crossings"]);
   fmt::print("parameters (for --wrt):\n");
-  for (const Parameter& parameter : list_parameters(scene)) {
-    report["parameters"].push_back(
-        {{"name", parameter.name}, {"unit", parameter.unit}, {"size", parameter.size}});
-    print_parameter(parameter);
-  }
-  report["warnings"] = warnings.lines();
-  write_json(common.json, report.dump(2));
+  for (const Parameter& parameter : list_parameters(scene)) print_parameter(parameter);
+  info["warnings"] = warnings.lines();
+  write_json(common.json, info.dump(2));
   return kSuccess;
 }
 

@@ -8,7 +8,6 @@
 #include "limn/integrators/render.h"
 #include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
-#include "tools/limn/compare_images.h"
 #include "tools/limn/output_files.h"
 #include "tools/limn/run_part.h"
 

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "tools/limn/command_support.h"
 #include "tools/limn/output_files.h"
@@ -55,8 +54,12 @@ std::vector<ImageAttribute> image_attributes(const Scene& scene, const Compariso
   RunSettings settings;
   settings.seed = shown->seed;
   auto attributes = provenance(scene, settings, shown->run.spp);
-  attributes.push_back({"limn.parameter", c.parameter});
-  attributes.push_back({"limn.terms", c.terms});
+  if (c.what.empty()) {
+    attributes.push_back({"limn.parameter", c.parameter});
+    attributes.push_back({"limn.terms", c.terms});
+  } else {
+    attributes.push_back({"limn.what", c.what});
+  }
   attributes.push_back({"limn.method", m.name});
   for (const ImageAttribute& a : settings_attributes(m.settings)) attributes.push_back(a);
   return attributes;
@@ -65,18 +68,20 @@ std::vector<ImageAttribute> image_attributes(const Scene& scene, const Compariso
 void write_pictures(const std::string& folder, const Scene& scene, const Comparison& c,
                     const Scales& scales) {
   const Film& film = scene.film;
+  const auto write_picture = [&](const std::string& file, const Image& image) {
+    c.what.empty() ? write_signed_png(file, image, scales.derivative) : write_png(file, image, 1);
+  };
   if (c.image.spp > 0) {
     write_png(in_folder(folder, "image.png"),
               mean_image(c.image.radiance, film.crop_width, film.crop_height), 1);
   }
-  write_signed_png(in_folder(folder, "reference.png"), to_image(c.reference.image, film),
-                   scales.derivative);
+  write_picture(in_folder(folder, "reference.png"), to_image(c.reference.image, film));
   for (const ComparedMethod& m : c.methods) {
     if (m.image.empty()) continue;
     const std::string stem = in_folder(folder, file_part(m.name));
     const Image image = to_image(m.image, film);
     write_exr(stem + ".exr", film_channels(scene, image), false, image_attributes(scene, c, m));
-    write_signed_png(stem + ".png", image, scales.derivative);
+    write_picture(stem + ".png", image);
     write_signed_png(stem + "_error.png", to_image(minus(m.image, c.reference.image), film),
                      scales.error);
   }
@@ -167,11 +172,12 @@ json method_json(const ComparedMethod& m, const std::vector<double>& times) {
 }
 
 json comparison_json(const Scene& scene, const Comparison& c, const Scales& scales) {
-  json object = {{"kind", "compare"},
+  json object = {{"kind", c.what.empty() ? "compare" : "compare_images"},
                  {"command", c.command},
                  {"scene", scene.file},
                  {"sensor", sensor_name(scene)},
                  {"defines", c.defines},
+                 {"what", c.what},
                  {"parameter", c.parameter},
                  {"unit", c.unit},
                  {"warnings", c.warnings},
@@ -198,42 +204,6 @@ json comparison_json(const Scene& scene, const Comparison& c, const Scales& scal
     object["methods"].push_back(method_json(m, c.options.times));
   }
   return object;
-}
-
-// Names of terms of all methods, in the order in which they first come.
-std::vector<std::string> term_names(const Comparison& c) {
-  std::vector<std::string> names;
-  for (const ComparedMethod& m : c.methods) {
-    for (const ComparedRun& r : m.runs) {
-      for (const auto& [name, seconds] : r.run.term_seconds) {
-        if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
-      }
-    }
-  }
-  return names;
-}
-
-void write_csv(const std::string& file, const Comparison& c) {
-  std::ostringstream stream;
-  const std::vector<std::string> names = term_names(c);
-  stream << "method,time,repeat,seed,seconds,setup_seconds,spp,rays,mse,relative_mse,trimmed_mse";
-  for (const std::string& name : names) stream << "," << name << "_seconds";
-  stream << ",peak_memory_bytes\n";
-  for (const ComparedMethod& m : c.methods) {
-    for (const ComparedRun& r : m.runs) {
-      stream << fmt::format("{},{},{},{},{},{},{},{},{},{},{}", m.name, c.options.times[r.budget],
-                            r.repeat, r.seed, r.run.seconds, r.run.setup_seconds, r.run.spp,
-                            r.run.rays, r.errors.mse, r.errors.relative_mse, r.errors.trimmed_mse);
-      for (const std::string& name : names) {
-        stream << ",";
-        for (const auto& [term, seconds] : r.run.term_seconds) {
-          if (term == name) stream << fmt::format("{}", seconds);
-        }
-      }
-      stream << fmt::format(",{}\n", r.run.peak_memory_bytes);
-    }
-  }
-  write_file(file, stream.str());
 }
 
 // "1.23e-05 +- 4e-07"
@@ -290,7 +260,6 @@ void write_comparison(const std::string& folder, const Scene& scene, const Compa
   scales.derivative = signed_scale(to_image(comparison.reference.image, scene.film));
   scales.error = error_scale(comparison, scene.film);
   write_pictures(folder, scene, comparison, scales);
-  write_csv(in_folder(folder, "compare.csv"), comparison);
   write_json(in_folder(folder, "compare.json"), comparison_json(scene, comparison, scales).dump(2));
 }
 
@@ -298,6 +267,7 @@ void print_comparison(const Comparison& c) {
   fmt::print("reference: {}, {} samples per pixel, {:.3g} s{}, MSE of its own {:.3g}\n",
              c.reference.method, c.reference.spp, c.reference.seconds,
              c.reference.cached ? " (kept)" : "", mean_of(c.reference.variance));
+  if (!c.not_by_rays.empty()) fmt::print("(not rays: {})\n", c.not_by_rays);
   Table table({{"method", true},
                {"time [s]"},
                {"set-up [s]"},

@@ -14,13 +14,15 @@ namespace limn {
 struct Comparison {
   std::string command;
   std::map<std::string, std::string> defines;
+  std::string what;  // the images show; "": derivatives
   std::string parameter, unit, terms;
   uint64_t seed = 0;
   int threads = 1;
   CompareOptions options;
-  RenderResult image;  // the plain rendering; no samples if interrupted
+  RenderResult image;  // the plain rendering beside derivatives; no samples if interrupted
   Reference reference;
   std::string reference_file;
+  std::string not_by_rays;  // why the reference of images is not by rays
   std::vector<ComparedMethod> methods;
   std::vector<std::string> warnings;  // of the scene
 };

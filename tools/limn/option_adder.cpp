@@ -109,4 +109,18 @@ void refuse_options(const CLI::App& app, const std::vector<std::string>& names,
   }
 }
 
+void check_image_options(const CLI::App& app, const std::vector<Method>& methods) {
+  const auto any = [&](auto&& has) {
+    return std::ranges::any_of(methods, [&](const Method& m) { return has(*m->image); });
+  };
+  if (!any([](const ImageMethod& image) { return image.by_lines; })) {
+    refuse_options(app, {"--lines", "--tolerance"},
+                   "an option of the methods silhouettes and lines alone");
+  }
+  const auto by_rays = [](const ImageMethod& image) {
+    return image.looks_around && !image.by_lines;
+  };
+  if (!any(by_rays)) refuse_options(app, {"--rays"}, "an option of the method rays alone");
+}
+
 }  // namespace limn

@@ -61,5 +61,7 @@ void refuse_samples(const CLI::App& app, FilmPoints points, std::vector<std::str
   });
   refuse_options(app, names, "--points faces takes no samples");
 }
+// InputError for options of images that none of the methods has.
+void check_image_options(const CLI::App& app, const std::vector<Method>& methods);
 
 }  // namespace limn

@@ -33,7 +33,7 @@ std::string ending(const std::string& text) {
   return text.size() <= kMost ? text : "..." + text.substr(text.size() - kMost);
 }
 
-class MitsubaMethod final : public DerivativeMethod {
+class MitsubaMethod final : public TimedMethod {
  public:
   MitsubaMethod(const std::string& name, const MethodInput& input,
                 const std::map<std::string, std::string>& defines, const std::string& folder)
@@ -143,9 +143,9 @@ class MitsubaMethod final : public DerivativeMethod {
 
 bool is_mitsuba(const std::string& name) { return name == kMitsuba || name == kMitsubaAfterSetup; }
 
-std::unique_ptr<DerivativeMethod> make_mitsuba_method(
-    const std::string& name, const MethodInput& input,
-    const std::map<std::string, std::string>& defines, const std::string& folder) {
+std::unique_ptr<TimedMethod> make_mitsuba_method(const std::string& name, const MethodInput& input,
+                                                 const std::map<std::string, std::string>& defines,
+                                                 const std::string& folder) {
   return std::make_unique<MitsubaMethod>(name, input, defines, folder);
 }
 

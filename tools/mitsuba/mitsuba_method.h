@@ -4,7 +4,7 @@
 #include <memory>
 #include <string>
 
-#include "limn/integrators/derivative_method.h"
+#include "limn/integrators/timed_method.h"
 
 namespace limn {
 
@@ -16,8 +16,8 @@ bool is_mitsuba(const std::string& name);
 
 // `name`: one of these two. `folder` takes the files that each run leaves behind for a moment.
 // Every run throws MethodMissing where Mitsuba is not installed.
-std::unique_ptr<DerivativeMethod> make_mitsuba_method(
-    const std::string& name, const MethodInput& input,
-    const std::map<std::string, std::string>& defines, const std::string& folder);
+std::unique_ptr<TimedMethod> make_mitsuba_method(const std::string& name, const MethodInput& input,
+                                                 const std::map<std::string, std::string>& defines,
+                                                 const std::string& folder);
 
 }  // namespace limn

@@ -113,7 +113,7 @@ Comparison CompareCall::run(const Arguments& /*given*/) const {
     first.progress = nullptr;
     reference = make_reference(input, first);
     if (reference.spp < 2) return;
-    std::vector<std::unique_ptr<DerivativeMethod>> list;
+    std::vector<std::unique_ptr<TimedMethod>> list;
     for (const Method& method : chosen) list.push_back(make_method(input, method));
     compared = compare({times, repeats}, reference, list, settings);
   });

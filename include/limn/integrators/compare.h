@@ -1,12 +1,12 @@
 #pragma once
-// Derivative images of several methods at equal time, against one reference.
+// Images or derivative images of several methods at equal time, against one reference.
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "limn/integrators/derivative_method.h"
 #include "limn/integrators/metrics.h"
 #include "limn/integrators/reference.h"
+#include "limn/integrators/timed_method.h"
 
 namespace limn {
 
@@ -41,6 +41,7 @@ struct ComparedMethod {
   std::string message;  // why it is missing or not complete
   std::vector<MethodSetting> settings;
   std::vector<ComparedRun> runs;
+  std::vector<std::string> warnings;  // of the runs, each once
   // The first repeat of the longest budget that has one; empty without runs.
   std::vector<double> image;
   std::vector<BudgetSummary> summary;  // of the budgets with a run
@@ -55,7 +56,7 @@ struct ComparedMethod {
 // interruption; samples and seconds do not count. Interrupted, the result holds all runs that were
 // finished.
 std::vector<ComparedMethod> compare(const CompareOptions& options, const Reference& reference,
-                                    const std::vector<std::unique_ptr<DerivativeMethod>>& methods,
+                                    const std::vector<std::unique_ptr<TimedMethod>>& methods,
                                     const RunSettings& settings);
 
 // The seed of one run: a different one for each purpose, whatever the other runs are.

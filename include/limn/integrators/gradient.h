@@ -1,13 +1,13 @@
 #pragma once
 // Derivatives of the image with respect to scene parameters, in forward mode, by any method, with
 // standard errors. Methods that work term by term add up
-//   dI/dtheta = interior (what slides within continuous regions)
-//             + camera   (silhouettes on the film)
-//             + boundary (silhouettes that shading points see)
-//             + shadow   (edges of sharp shadows, where the scene has lights without extent)
-//             + direct + penumbra (silhouettes that shading points see before emitters and the sun,
-//                                  the edges of soft shadows; of methods that keep this apart)
-// after Li et al. 2018 with directions held fixed in solid angle everywhere.
+//   dI/dtheta = interior (the integrand away from discontinuities)
+//             + camera   (silhouettes as the camera sees them)
+//             + boundary + direct + penumbra (silhouettes as vertices of paths see them; before
+//                         light sets apart, drawn from the vertex or from the light)
+//             + shadow   (edges of the hard shadows of delta lights)
+//             + filter   (the reconstruction filter where film samples follow the image motion)
+// after Li et al. 2018, with directions fixed in world space (solid-angle measure).
 #include <initializer_list>
 #include <optional>
 #include <string>

@@ -1,6 +1,6 @@
 #pragma once
-// The derivative image that methods are measured against: from a long run, kept in files that know
-// what they belong to.
+// The image that methods are measured against: from a long run, kept in files that know what they
+// belong to.
 #include <map>
 #include <optional>
 #include <string>
@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "limn/core/scene.h"
-#include "limn/integrators/derivative_method.h"
+#include "limn/integrators/timed_method.h"
 
 namespace limn {
 

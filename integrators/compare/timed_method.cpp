@@ -1,12 +1,12 @@
 // The rows of the table of methods, as a comparison runs them.
-#include "limn/integrators/derivative_method.h"
+#include "limn/integrators/timed_method.h"
 
 #include "integrators/compare/edge_events.h"
 
 namespace limn {
 namespace {
 
-class TableMethod final : public DerivativeMethod {
+class TableMethod final : public TimedMethod {
  public:
   TableMethod(const MethodInput& input, Method method)
       : input_(input), method_(std::move(method)) {}
@@ -56,7 +56,7 @@ GradientOptions MethodInput::options(const Method& method) const {
   return options;
 }
 
-std::unique_ptr<DerivativeMethod> make_method(const MethodInput& input, const Method& method) {
+std::unique_ptr<TimedMethod> make_method(const MethodInput& input, const Method& method) {
   check_task(method, Task::kGradient);
   return std::make_unique<TableMethod>(input, method);
 }

@@ -1,6 +1,6 @@
 #pragma once
-// Ways to a derivative image as a comparison runs them: each takes a scene, a parameter and a time,
-// and returns an image with what it knows of its own error. The rows of methods.h are such ways;
+// Methods as comparisons run them: each takes a time and returns a derivative image, or an image
+// (compare_images.h), with what it knows of its own error. The rows of methods.h are such methods;
 // others can live outside.
 #include <memory>
 #include <optional>
@@ -28,6 +28,7 @@ struct MethodRun {
   std::vector<std::pair<std::string, double>> term_seconds;
   uint64_t peak_memory_bytes = 0;  // 0: this process' own peak
   NonFinite non_finite;
+  std::vector<std::string> warnings;  // of images
 };
 
 // The method cannot run here; what() says why and what to do.
@@ -36,9 +37,9 @@ class MethodMissing : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-class DerivativeMethod {
+class TimedMethod {
  public:
-  virtual ~DerivativeMethod() = default;
+  virtual ~TimedMethod() = default;
   virtual std::string name() const = 0;
   virtual std::string description() const = 0;
   // Takes settings.seconds and reports what it really took. May throw MethodMissing.
@@ -64,6 +65,6 @@ struct MethodInput {
 };
 
 // A row of the table. InputError for one without derivatives.
-std::unique_ptr<DerivativeMethod> make_method(const MethodInput& input, const Method& method);
+std::unique_ptr<TimedMethod> make_method(const MethodInput& input, const Method& method);
 
 }  // namespace limn
