@@ -12,6 +12,7 @@
 #include "integrators/edges/texture_jumps.h"
 #include "integrators/estimates/batches.h"
 #include "integrators/film/film_regions.h"
+#include "integrators/methods/run_notes.h"
 #include "integrators/methods/selection.h"
 #include "integrators/methods/term_sums.h"
 #include "integrators/paths/chain_light.h"
@@ -126,7 +127,7 @@ class TermJob {
     };
     run_batches(passes_, settings, watch, take, moving_ ? at : EstimatorsAt());
     result.seconds = watch.seconds();
-    if (method_.warps) describe_warping(result);
+    if (method_.warps) describe_warping(options_.warp, result);
     return result;
   }
 
@@ -193,27 +194,6 @@ class TermJob {
       told = true;
       result.at_kink = result.at_kink || viewpoints->cross_planes();
     }
-  }
-
-  void describe_warping(GradientResult& result) const {
-    TermCost all;
-    for (const TermRun& term : result.terms) all.merge(term.cost);
-    const auto share = [](uint64_t part, uint64_t of) {
-      return of > 0 ? static_cast<double>(part) / static_cast<double>(of) : 0;
-    };
-    result.settings.push_back({"auxiliary rays", static_cast<double>(options_.warp.rays)});
-    result.settings.push_back({"kappa", options_.warp.kappa});
-    result.settings.push_back({"directions ruled by one ray", share(all.dominated, all.warped)});
-    result.settings.push_back({"rays on an edge", static_cast<double>(all.dropped)});
-  }
-
-  static void describe_film(const std::vector<FilmMotion>& film, GradientResult& result) {
-    const auto moving = std::count_if(film.begin(), film.end(), [](const FilmMotion& motion) {
-      return !is_zero(motion.x) || !is_zero(motion.y);
-    });
-    const double share = static_cast<double>(moving) / static_cast<double>(film.size());
-    result.settings.push_back(
-        {"share of pixels with reparameterised film samples", std::round(share * 100) / 100});
   }
 
   // What moving directions change in one term they take back in the others, and at every jump of
@@ -434,17 +414,6 @@ class TermJob {
     const double share = several ? kPilotShare / 3 : kPilotShare;
     return pilot_size(each, pixels, spp, share * budget.settings.seconds,
                       budget.settings.seconds - budget.watch.seconds());
-  }
-
-  static void describe_pilot(const Probed& probed, bool looked, double detail,
-                             GradientResult& result) {
-    result.settings.push_back(
-        {"pilot", probed.pilot.spp == 0 ? std::string("none: too few samples fit into the time")
-                                        : fmt::format("{} samples of {} pixels", probed.pilot.spp,
-                                                      probed.pilot.grid.size())});
-    result.settings.push_back(
-        {"film motion", fmt::format("{}looked for; {:.3g} moving edges in a pixel",
-                                    looked ? "" : "not ", detail)});
   }
 
   // Positions on the film move where pilots with them and without say so; what turns of directions
