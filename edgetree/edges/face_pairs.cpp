@@ -2,7 +2,6 @@
 #include "limn/edgetree/face_pairs.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
 #include "edgetree/edges/contacts.h"

@@ -2,7 +2,6 @@
 #include "edgetree/edges/half_edges.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <unordered_map>
 

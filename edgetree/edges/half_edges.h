@@ -1,6 +1,5 @@
 #pragma once
 // Directed sides of faces over welded vertices, with degenerate faces removed.
-#include <cstdint>
 #include <vector>
 
 #include "limn/core/mesh.h"

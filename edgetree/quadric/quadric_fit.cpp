@@ -2,8 +2,6 @@
 #include "edgetree/quadric/quadric_fit.h"
 
 #include <Eigen/Dense>
-#include <algorithm>
-#include <cmath>
 #include <vector>
 
 #include "edgetree/bounds/normaliser.h"

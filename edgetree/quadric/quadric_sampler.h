@@ -2,7 +2,6 @@
 // The paper's forest (Soroka, Peters, Marschner 2025): the baseline that the edge forest is derived
 // from (differences are listed in edgetree/README.md).
 #include <memory>
-#include <vector>
 
 #include "edgetree/quadric/quadric_config.h"
 #include "limn/edgetree/edge_sampler.h"

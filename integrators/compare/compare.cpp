@@ -177,6 +177,18 @@ uint64_t derived_seed(uint64_t seed, const std::string& purpose) {
   return hash >> 33;  // every program can read such a seed
 }
 
+NonFinite non_finite_of(const Reference& reference, const std::vector<ComparedMethod>& methods) {
+  NonFinite all = reference.non_finite;
+  for (const ComparedMethod& method : methods) {
+    for (const ComparedRun& run : method.runs) all.merge(run.run.non_finite);
+  }
+  return all;
+}
+
+int block_size(const Film& film) {
+  return std::max(1, (std::max(film.crop_width, film.crop_height) + 7) / 8);
+}
+
 std::vector<ComparedMethod> compare(const CompareOptions& options, const Reference& reference,
                                     const std::vector<std::unique_ptr<TimedMethod>>& methods,
                                     const RunSettings& settings) {

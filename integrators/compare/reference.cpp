@@ -135,8 +135,7 @@ void read_header(const Attributes& attributes, const Film& film, Reference& r) {
   r.blocks.variances = split_numbers(attributes.at("limn.block_variances"));
   r.edges = split_numbers(attributes.at("limn.block_edges"));
   r.blocks.degrees = std::stod(attributes.at("limn.block_degrees"));
-  const auto event = attributes.find("limn.block_event");  // older files have none
-  if (event != attributes.end()) r.blocks.event = std::stod(event->second);
+  r.blocks.event = std::stod(attributes.at("limn.block_event"));
 }
 
 Reference read_matching(const std::string& file, const Attributes& attributes, const Film& film) {

@@ -8,7 +8,6 @@
 // cot theta = (pole . w) / (r . w), which falls from infinity to -infinity and needs no root.
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <span>
 #include <vector>
 

@@ -1,7 +1,6 @@
 // One path per sample of a pixel, in plain numbers.
 #include "integrators/methods/radiance_estimator.h"
 
-#include <algorithm>
 #include <array>
 #include <utility>
 #include <vector>

@@ -1,6 +1,5 @@
 #pragma once
 // What normal maps and bump maps share: a BSDF about another normal.
-#include <algorithm>
 #include <memory>
 
 #include "src/bsdf/types.h"

@@ -3,8 +3,6 @@
 // to -X and v from +Y to -Y.
 #include <fmt/format.h>
 
-#include <limits>
-
 #include "limn/core/framed_light.h"
 #include "limn/core/names.h"
 #include "src/light/types.h"

@@ -1,6 +1,5 @@
 #pragma once
 // Converts a projected face to grid lines of a window.
-#include <optional>
 
 #include "limn/core/visible_regions.h"
 #include "src/regions/grid_line.h"

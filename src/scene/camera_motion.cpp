@@ -1,5 +1,4 @@
 // Motions of the camera.
-#include <algorithm>
 #include <cmath>
 #include <limits>
 

@@ -2,7 +2,6 @@
 #include "limn/core/exposure.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "limn/core/coincident_faces.h"
 #include "limn/core/error.h"

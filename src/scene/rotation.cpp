@@ -1,9 +1,7 @@
 // Rodrigues' formula, its inverse and its derivative.
 #include "src/scene/rotation.h"
 
-#include <algorithm>
 #include <cmath>
-#include <utility>
 
 namespace limn {
 namespace {

@@ -1,6 +1,5 @@
 // Motions of a shape's vertices: rigid, scaling, along a field, single vertices.
 #include <algorithm>
-#include <cmath>
 
 #include "limn/core/check.h"
 #include "limn/core/displacement.h"

@@ -1,7 +1,6 @@
 // A sphere of few faces, all nearly alike.
 #include <cmath>
 #include <map>
-#include <utility>
 
 #include "tools/generate/generate_kinds.h"
 

@@ -1,7 +1,6 @@
 #pragma once
 // The contract of a command of the program: it says what it takes, then does it.
 #include <CLI/CLI.hpp>
-#include <memory>
 #include <string>
 #include <vector>
 

@@ -97,11 +97,6 @@ CompareOptions make_options(const CompareArguments& command) {
   return options;
 }
 
-// As `check` has them: eight blocks along the longer side.
-int block_size(const Film& film) {
-  return std::max(1, (std::max(film.crop_width, film.crop_height) + 7) / 8);
-}
-
 // Shares the progress bar among jobs in proportion to their seconds.
 class Stages {
  public:
@@ -214,10 +209,7 @@ class Comparer {
 
   NonFinite non_finite() const {
     NonFinite all = result_.image.non_finite;
-    all.merge(result_.reference.non_finite);
-    for (const ComparedMethod& m : result_.methods) {
-      for (const ComparedRun& r : m.runs) all.merge(r.run.non_finite);
-    }
+    all.merge(non_finite_of(result_.reference, result_.methods));
     return all;
   }
 

@@ -1,6 +1,5 @@
 // `limn reconstruct`: an object from photographs. It is part of the Python module, which this
 // starts where the build has it.
-#include <fmt/format.h>
 #include <unistd.h>
 
 #include <cstdlib>

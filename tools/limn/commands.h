@@ -1,6 +1,5 @@
 #pragma once
 // The commands: a file of its own each, and one row.
-#include <vector>
 
 #include "tools/limn/command.h"
 

@@ -2,7 +2,6 @@
 // The command line's side of the table of options (limn/integrators/options.h).
 #include <CLI/CLI.hpp>
 #include <functional>
-#include <optional>
 #include <string>
 #include <vector>
 

@@ -36,19 +36,15 @@ std::string properties(const char* type, const std::string& prefix) {
 
 std::string stem_of(const std::string& file) { return fs::path(file).stem().string(); }
 
-// Whether limn wrote it for this -o. Older versions of limn only tell of themselves, so that the
-// name must say the rest.
+// Whether limn wrote it for this -o.
 bool is_own(const fs::path& file, const std::string& output) {
   try {
-    bool of_limn = false;
     for (const ImageAttribute& a : read_exr_attributes(file.string())) {
       if (a.name == kOutputAttribute) return a.value == output_name(output);
-      of_limn = of_limn || a.name == "limn.scene";
     }
-    return of_limn && file.stem() == stem_of(output) + "_stderr";
   } catch (const InputError&) {
-    return false;
   }
+  return false;
 }
 
 }  // namespace

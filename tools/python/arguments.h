@@ -3,6 +3,7 @@
 // which its signature, its documentation and the reading of a call are made.
 #include <functional>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "limn/integrators/options.h"
@@ -102,6 +103,24 @@ void add_store(Arguments& arguments, RunRequest& run);
 // "auto", "uniform" or counts; uniform: null where all pixels are alike anyway.
 void add_samples(Arguments& arguments, std::optional<SampleCounts>& counts,
                  bool* uniform = nullptr);
+
+// What calls that compute have.
+struct RunCall {
+  const SceneHandle* scene = nullptr;
+  RunRequest request;
+  nb::object progress = nb::none();
+
+  // job(scene, settings) of the scene as it is, see run_job; what it returns.
+  template <class Job>
+  auto result_of(const Job& job) const {
+    const auto shared = scene->share();
+    std::invoke_result_t<Job, const Scene&, const RunSettings&> result;
+    run_job(settings_of(request, *shared), progress,
+            [&](const RunSettings& settings) { result = job(*shared, settings); });
+    return result;
+  }
+  const Film& film() const { return scene->get().film; }
+};
 
 inline constexpr const char* kNamesType = "str | collections.abc.Sequence[str]";
 inline constexpr const char* kNamesOrNoneType = "str | collections.abc.Sequence[str] | None";

@@ -31,13 +31,10 @@ Estimate to_estimate(const ParameterAdjoint& adjoint, const BackwardResult& resu
           true};
 }
 
-struct BackwardCall {
-  const SceneHandle* scene = nullptr;
+struct BackwardCall : RunCall {
   nb::object adjoint;
   std::optional<Names> names;
   BackwardOptions options;
-  RunRequest request;
-  nb::object progress = nb::none();
 
   void take(Arguments& a) {
     add_scene(a, scene);
@@ -57,11 +54,9 @@ struct BackwardCall {
     if (names && options.parameters.empty()) {
       throw InputError("names: none are given; None stands for all parameters");
     }
-    const auto shared = scene->share();
     const Image image = to_image(adjoint);
-    BackwardResult result;
-    run_job(settings_of(request, *shared), progress, [&](const RunSettings& settings) {
-      result = backward(*shared, image, options, settings);
+    const BackwardResult result = result_of([&](const Scene& of, const RunSettings& settings) {
+      return backward(of, image, options, settings);
     });
     nb::dict estimates;
     for (const ParameterAdjoint& parameter : result.parameters) {
@@ -73,12 +68,9 @@ struct BackwardCall {
   }
 };
 
-struct LossCall {
-  const SceneHandle* scene = nullptr;
+struct LossCall : RunCall {
   nb::object target, mask = nb::none();
   LossOptions options;
-  RunRequest request;
-  nb::object progress = nb::none();
 
   void take(Arguments& a) {
     add_scene(a, scene);
@@ -93,14 +85,11 @@ struct LossCall {
 
   LossResult run(const Arguments& given) const {
     given.refuse_samples(options.points, {"spp"});
-    const auto shared = scene->share();
     const Image wanted = to_image(target);
     const Image weights = mask.is_none() ? Image{} : to_image(mask);
-    LossResult result;
-    run_job(settings_of(request, *shared), progress, [&](const RunSettings& settings) {
-      result = image_loss(*shared, wanted, options, settings, weights);
+    return result_of([&](const Scene& of, const RunSettings& settings) {
+      return image_loss(of, wanted, options, settings, weights);
     });
-    return result;
   }
 };
 

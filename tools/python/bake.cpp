@@ -7,11 +7,8 @@
 namespace limn::python {
 namespace {
 
-struct BakeCall {
-  const SceneHandle* scene = nullptr;
+struct BakeCall : RunCall {
   RenderOptions options;
-  RunRequest request;
-  nb::object progress = nb::none();
 
   void take(Arguments& a) {
     add_scene(a, scene);
@@ -19,10 +16,8 @@ struct BakeCall {
     a(options.lines, kBakedLinesOption);
   }
   BakedView run(const Arguments&) const {
-    const auto shared = scene->share();
-    BakedView::Made made;
-    run_job(settings_of(request, *shared), progress, [&](const RunSettings& settings) {
-      made = BakedView::make(*shared, settings, options.lines);
+    auto made = result_of([&](const Scene& of, const RunSettings& settings) {
+      return BakedView::make(of, settings, options.lines);
     });
     if (made.non_finite.count > 0) check_finite(made.non_finite, nb::cast(std::move(made.view)));
     return std::move(made.view);

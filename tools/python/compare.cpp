@@ -40,16 +40,13 @@ Estimate to_estimate(const Reference& reference, int width, int height) {
           {}};
 }
 
-struct CompareCall {
-  const SceneHandle* scene = nullptr;
+struct CompareCall : RunCall {
   std::string name;
   std::vector<std::string> methods;
   std::vector<double> times;
   int repeats = 4;
   std::optional<double> reference_seconds;
   GradientOptions options;  // but for parameters and method
-  RunRequest request;
-  nb::object progress = nb::none();
 
   void take(Arguments& a);
   Comparison run(const Arguments& given) const;
@@ -85,22 +82,14 @@ void check_call(const Scene& scene, const CompareCall& call, const std::vector<M
   if (call.times.empty()) throw InputError("compare needs a time or more");
 }
 
-NonFinite non_finite(const Reference& reference, const std::vector<ComparedMethod>& methods) {
-  NonFinite all = reference.non_finite;
-  for (const ComparedMethod& method : methods) {
-    for (const ComparedRun& run : method.runs) all.merge(run.run.non_finite);
-  }
-  return all;
-}
-
 Comparison CompareCall::run(const Arguments& /*given*/) const {
   const auto shared = scene->share();
   const std::vector<Method> chosen(methods.begin(), methods.end());
   check_call(*shared, *this, chosen);
   const int width = shared->film.crop_width, height = shared->film.crop_height;
-  const int block = std::max(1, (std::max(width, height) + 7) / 8);
-  const MethodInput input{*shared, name,         {},           0,
-                          block,   std::nullopt, options.warp, options.exact_film};
+  const MethodInput input{
+      *shared,           name, {}, 0, block_size(shared->film), std::nullopt, options.warp,
+      options.exact_film};
   double all = 0;
   for (const double time : times) all += time * repeats;
   Reference reference;
@@ -118,7 +107,7 @@ Comparison CompareCall::run(const Arguments& /*given*/) const {
     compared = compare({times, repeats}, reference, list, settings);
   });
   Comparison result{to_estimate(reference, width, height), compared, width, height};
-  check_finite(non_finite(reference, compared), nb::cast(result));
+  check_finite(non_finite_of(reference, compared), nb::cast(result));
   return result;
 }
 

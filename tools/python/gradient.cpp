@@ -35,12 +35,9 @@ void add_samples(Arguments& arguments, std::optional<SampleCounts>& counts, bool
 
 namespace {
 
-struct GradientCall {
-  const SceneHandle* scene = nullptr;
+struct GradientCall : RunCall {
   Names names;
   GradientOptions options;
-  RunRequest request;
-  nb::object progress = nb::none();
 
   void take(Arguments& a) {
     add_scene(a, scene);
@@ -56,13 +53,12 @@ struct GradientCall {
   nb::dict run(const Arguments& given) {
     given.refuse_samples(options.points, {"spp", "seconds", "samples"});
     options.parameters = to_list(names);
-    const auto shared = scene->share();
-    GradientResult result;
-    run_job(settings_of(request, *shared), progress,
-            [&](const RunSettings& settings) { result = gradient(*shared, options, settings); });
+    const GradientResult result = result_of([&](const Scene& of, const RunSettings& settings) {
+      return gradient(of, options, settings);
+    });
     nb::dict estimates;
     for (const ParameterGradient& g : result.parameters) {
-      Estimate estimate = to_estimate(g.total, shared->film, result.spp, result.seconds);
+      Estimate estimate = to_estimate(g.total, film(), result.spp, result.seconds);
       estimate.warnings = result.warnings;
       estimate.is_derivative = true;
       estimates[nb::cast(g.name)] = nb::cast(std::move(estimate));

@@ -1,7 +1,6 @@
 // Images as arrays, and as files.
 #include "limn/core/image.h"
 
-#include <cmath>
 #include <cstring>
 #include <filesystem>
 

@@ -27,11 +27,8 @@ nb::object to_numpy(const Estimate& e, const nb::object& dtype, const nb::object
   return copy.is_none() || !nb::cast<bool>(copy) ? value : value.attr("copy")();
 }
 
-struct RenderCall {
-  const SceneHandle* scene = nullptr;
+struct RenderCall : RunCall {
   RenderOptions options;
-  RunRequest request;
-  nb::object progress = nb::none();
 
   void take(Arguments& a) {
     add_scene(a, scene);
@@ -43,11 +40,10 @@ struct RenderCall {
 
   Estimate run(const Arguments& given) const {
     given.refuse_samples(options.points, {"spp"});
-    const auto shared = scene->share();
-    RenderResult result;
-    run_job(settings_of(request, *shared), progress,
-            [&](const RunSettings& settings) { result = render(*shared, settings, options); });
-    Estimate image = to_estimate(result.radiance, shared->film, result.spp, result.seconds);
+    const RenderResult result = result_of([&](const Scene& of, const RunSettings& settings) {
+      return limn::render(of, settings, options);
+    });
+    Estimate image = to_estimate(result.radiance, film(), result.spp, result.seconds);
     image.warnings = result.warnings;
     warn_all(result.warnings);
     check_finite(result.non_finite, nb::cast(image));
@@ -55,11 +51,8 @@ struct RenderCall {
   }
 };
 
-struct LayersCall {
-  const SceneHandle* scene = nullptr;
+struct LayersCall : RunCall {
   Names names;
-  RunRequest request;
-  nb::object progress = nb::none();
 
   void take(Arguments& a) {
     add_scene(a, scene);
@@ -68,10 +61,8 @@ struct LayersCall {
   }
 
   nb::dict run(const Arguments&) {
-    const auto shared = scene->share();
-    LayersResult result;
-    run_job(settings_of(request, *shared), progress, [&](const RunSettings& settings) {
-      result = render_layers(*shared, to_list(names), settings);
+    LayersResult result = result_of([&](const Scene& of, const RunSettings& settings) {
+      return render_layers(of, to_list(names), settings);
     });
     nb::dict layers;
     for (ImageLayer& layer : result.layers) {

@@ -59,6 +59,10 @@ std::vector<ComparedMethod> compare(const CompareOptions& options, const Referen
                                     const std::vector<std::unique_ptr<TimedMethod>>& methods,
                                     const RunSettings& settings);
 
+// Samples that are not finite, of all runs.
+NonFinite non_finite_of(const Reference& reference, const std::vector<ComparedMethod>& methods);
+// Pixels of a side of the blocks whose sums show bias: eight along the film's longer side.
+int block_size(const Film& film);
 // The seed of one run: a different one for each purpose, whatever the other runs are.
 uint64_t derived_seed(uint64_t seed, const std::string& purpose);
 

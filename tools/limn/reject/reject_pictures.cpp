@@ -2,7 +2,6 @@
 #include "tools/limn/reject/reject_pictures.h"
 
 #include <algorithm>
-#include <cmath>
 #include <optional>
 #include <vector>
 
