@@ -9,8 +9,11 @@
 #include <limits>
 
 #include "integrators/compare/check_bend.h"
+#include "integrators/compare/check_samples.h"
 #include "integrators/compare/check_scores.h"
 #include "integrators/compare/check_step.h"
+#include "integrators/terms/term.h"
+#include "limn/core/moved.h"
 #include "limn/core/parameter.h"
 #include "limn/integrators/methods.h"
 #include "limn/integrators/options.h"
@@ -31,6 +34,8 @@ constexpr double kSamplesPower = 2.5;
 struct Runs {
   GradientResult gradient;
   DifferenceResult differences;
+  double step = 0;
+  double seconds = 0;  // of both, with set-up and the search for the step
 };
 
 // What accuses, and what its score must exceed.
@@ -113,46 +118,58 @@ ProbeScores score_places(const Residual& residual, const Windows& windows,
   return places;
 }
 
-// The least part of an image (its means in the windows) that some probe finds.
-double visible_part(const ProbeScores& places, const std::vector<double>& image, double degrees) {
-  double visible = std::numeric_limits<double>::infinity();
+// The least part of an image (its means in the windows) that some probe finds, and that probe.
+struct VisiblePart {
+  double part = std::numeric_limits<double>::infinity();
+  const ProbeScore* place = nullptr;
+};
+VisiblePart visible_part(const ProbeScores& places, const std::vector<double>& image,
+                         double degrees) {
+  VisiblePart visible;
   for (const ProbeScore& place : places.list) {
     double seen = 0;
     for (size_t k = 0; k < image.size(); ++k) {
       seen += 0.5 * (place.probe[0][k] + place.probe[1][k]) * image[k];
     }
     const double wanted = student_from_normal(place.limit, degrees) + kFound;
-    if (seen != 0) visible = std::min(visible, wanted * place.score.error / std::fabs(seen));
+    const double part = wanted * place.score.error / std::fabs(seen);
+    if (seen != 0 && (part < visible.part || !visible.place)) visible = {part, &place};
   }
   return visible;
 }
 
-double magnitude(const std::vector<double>& values) {
-  double sum = 0;
-  for (const double v : values) sum += std::fabs(v);
-  return sum;
-}
-
-void find_power(const ProbeScores& places, const Residual& residual, const GradientResult& run,
-                CheckResult& result) {
+// Returns the score behind the error that shows least.
+Score find_power(const ProbeScores& places, const Residual& residual, const GradientResult& run,
+                 CheckResult& result) {
   const ParameterGradient& g = run.parameters[0];
-  result.power = {{"", 1, visible_part(places, residual.mean(g.total_blocks), residual.degrees())}};
+  const ProbeScore& whole = places.list[places.windows];
+  std::vector<const ProbeScore*> behind;
   double sum = 0;
+  const auto add = [&](const std::string& name, const Moments& blocks) {
+    const VisiblePart visible = visible_part(places, residual.mean(blocks), residual.degrees());
+    result.power.push_back({name, residual.magnitude(blocks), visible.part});
+    behind.push_back(visible.place ? visible.place : &whole);
+  };
+  result.power.clear();
+  add("", g.total_blocks);
   for (size_t t = 0; t < run.terms.size(); ++t) {
     if (!run.terms[t].computed) continue;
-    const std::vector<double> image = residual.mean(g.term_blocks[t]);
-    result.power.push_back(
-        {run.terms[t].name, magnitude(image), visible_part(places, image, residual.degrees())});
+    add(run.terms[t].name, g.term_blocks[t]);
     sum += result.power.back().share;
   }
-  double worst = 0;
+  const ProbeScore* worst = &whole;
   for (size_t i = 0; i < result.power.size(); ++i) {
-    CheckPower& power = result.power[i];
-    if (i > 0) power.share = sum > 0 ? power.share / sum : 0;
-    if (sum > 0 && !power.negligible()) worst = std::max(worst, power.visible);
+    double& share = result.power[i].share;
+    share = sum > 0 ? share / sum : 0;
+    if (result.power[i].of_whole() <= result.within) continue;
+    result.within = result.power[i].of_whole();
+    worst = behind[i];
   }
-  result.needed_spp =
-      static_cast<double>(run.spp) * std::max(1.0, std::pow(worst / kCheckWanted, kSamplesPower));
+  // Where all is noise.
+  if (sum == 0 && whole.score.error > 0) result.within = std::numeric_limits<double>::infinity();
+  result.needed_spp = static_cast<double>(run.spp) *
+                      std::max(1.0, std::pow(result.within / kCheckWanted, kSamplesPower));
+  return worst->score;
 }
 
 TotalComparison compare_totals(const Moments& gradient, const Moments& differences,
@@ -184,53 +201,53 @@ class Checker {
  public:
   Checker(const Scene& scene, const CheckOptions& options, const RunSettings& settings,
           const GradientRun& run)
-      : scene_(scene), options_(options), settings_(settings), run_(run) {
-    const int longer = std::max(scene.film.crop_width, scene.film.crop_height);
-    block_ = options.block > 0
-                 ? options.block
-                 : std::max(kLeastSpacing, (longer + kWindowsAlong - 1) / kWindowsAlong);
-    fine_ = std::max(1, block_ / kFineParts);
+      : scene_(scene),
+        options_(options),
+        settings_(settings),
+        run_(run),
+        block_(options.block > 0 ? options.block : block_of(scene.film)),
+        fine_(std::max(1, block_ / kFineParts)),
+        windows_(scene.film, block_, fine_) {
+    const Parameter parameter = find_parameter(scene, options.parameter);
+    natural_step_ = parameter.natural_step;
+    jumps_ = moved_in(scene, {&parameter, 1}).any() || find_smooth(scene);
   }
 
   CheckResult check() {
-    CheckResult result;
-    const Windows windows(scene_.film, block_, fine_);
-    result.block = block_;
-    result.step = options_.step;
-    if (result.step <= 0) {
-      result.step = find_check_step(scene_, options_.parameter, windows, settings_);
-    }
+    const Stopwatch watch;
+    const bool timed = settings_.seconds > 0;
+    samples_ = timed ? CheckSamples{kFirstCheckSamples, kFirstCheckSamples}
+                     : CheckSamples{settings_.spp, settings_.spp};
     Runs runs;
-    runs.gradient = run_(scene_, gradient_options(), settings_of(settings_.spp, 0, 0));
-    result.step = run_at_small_step(windows, result.step, runs);
-    if (!complete(runs, settings_.spp)) return interrupted(std::move(runs), result);
-    const Residual residual = residual_of(windows, runs, result.step);
-    const ProbeScores places = score_places(residual, windows, runs.gradient);
-    std::vector<double> z;
-    for (size_t k = 0; k < places.windows; ++k) z.push_back(-places.list[k].score.z);
-    result.windows = summarize(z);
-    result.total =
-        compare_totals(runs.gradient.parameters[0].image_sum,
-                       runs.differences.extrapolated.image_sum, places.list[places.windows].score);
-    result.widened = widened_errors(places);
-    result.p = places.p;
-    const ProbeScore& found = places.list[places.smallest];
-    result.found = found.name;
-    find_power(places, residual, runs.gradient, result);
-    if (result.p < kCheckStageLevel) {
-      if (!confirm(windows, found, runs, result)) return interrupted(std::move(runs), result);
+    for (;;) {
+      CheckResult result;
+      result.block = block_;
+      if (!take(runs)) return interrupted(std::move(runs), result);
+      const Residual residual = residual_of(runs);
+      const ProbeScores places = score_places(residual, windows_, runs.gradient);
+      const Score worst = find_power(places, residual, runs.gradient, result);
+      if (timed && result.within > kCheckWanted) {
+        if (const auto more = next_samples(runs, worst, result.within, watch.seconds())) {
+          samples_ = *more;
+          ++round_;
+          continue;
+        }
+      }
+      // Images need not be smooth over long steps: what these accuse is checked with shorter ones.
+      if (options_.step <= 0 && places.p < kCheckStageLevel && runs.step > natural_step_) {
+        most_ = natural_step_;
+        continue;
+      }
+      return judged(places, std::move(runs), std::move(result));
     }
-    if (result.confirmation && result.confirmation->p < kCheckStageLevel) {
-      if (!result.bends) result.verdict = Verdict::kDisagree;
-    } else if (result.needed_spp <= static_cast<double>(settings_.spp)) {
-      result.verdict = runs.gradient.incomplete ? Verdict::kNotComplete : Verdict::kAgree;
-    }
-    result.gradient = std::move(runs.gradient);
-    result.differences = std::move(runs.differences);
-    return result;
   }
 
  private:
+  static int block_of(const Film& film) {
+    const int longer = std::max(film.crop_width, film.crop_height);
+    return std::max(kLeastSpacing, (longer + kWindowsAlong - 1) / kWindowsAlong);
+  }
+
   GradientOptions gradient_options() const {
     GradientOptions gradient_options;
     gradient_options.parameters = {options_.parameter};
@@ -247,9 +264,12 @@ class Checker {
   RunSettings settings_of(int64_t spp, int stage, int part) const {
     RunSettings settings = settings_;
     settings.spp = static_cast<int>(std::min<int64_t>(spp, 1 << 30));
-    settings.seed = settings_.seed + static_cast<uint64_t>(stage) * 0xc0ffee +
+    settings.seconds = 0;
+    settings.seed = settings_.seed + static_cast<uint64_t>(3 * round_ + stage) * 0xc0ffee +
                     static_cast<uint64_t>(part) * 0x5eed;
-    if (settings_.progress) {
+    if (settings_.seconds > 0) {
+      settings.progress = nullptr;
+    } else if (settings_.progress) {
       settings.progress = [this, part](double done) {
         settings_.progress(0.5 * (std::min(part, 1) + done));
       };
@@ -257,21 +277,78 @@ class Checker {
     return settings;
   }
 
-  // Differences of the first run, at smaller steps until their bias is small; returns the step.
-  double run_at_small_step(const Windows& windows, double step, Runs& runs) const {
+  // Those of the next round, if there is time for one.
+  std::optional<CheckSamples> next_samples(const Runs& runs, const Score& worst, double within,
+                                           double elapsed) const {
+    const double own = runs.gradient.seconds - runs.gradient.setup_seconds;
+    // The search for the step takes as long as half of the differences, and runs at smaller steps
+    // are few.
+    const double theirs = 1.5 * (runs.differences.seconds - runs.differences.setup_seconds);
+    const double set_up = std::max(0.0, runs.seconds - own - theirs);
+    return more_samples({runs.gradient.spp, own, worst.gradient_variance},
+                        {runs.differences.spp, theirs, worst.difference_variance},
+                        kCheckWanted / within, settings_.seconds - elapsed - set_up);
+  }
+
+  // Both runs of a round, or the differences with shorter steps alone. False if interrupted.
+  bool take(Runs& runs) {
+    const Stopwatch watch;
+    if (most_ > natural_step_) {
+      runs.gradient = run_(scene_, gradient_options(), settings_of(samples_.gradient, 0, 0));
+    }
+    runs.step = options_.step;
+    if (runs.step <= 0) {
+      // A longer run's step is no larger but by chance.
+      const double most = round_ == 0 ? most_ : std::min(most_, 4 * last_step_);
+      runs.step = find_check_step(scene_, options_.parameter, windows_, most,
+                                  settings_of(samples_.differences, 0, 0));
+    }
+    run_at_small_step(runs);
+    runs.seconds = watch.seconds();
+    last_step_ = runs.step;
+    return complete(runs, samples_);
+  }
+
+  // Differences of a round's first run, at smaller steps until their bias is small.
+  void run_at_small_step(Runs& runs) const {
+    const int64_t spp = samples_.differences;
     for (int reduced = 0;; ++reduced) {
-      runs.differences = finite_differences(scene_, options_.parameter, step, fine_,
-                                            settings_of(settings_.spp, 0, 1 + reduced));
-      if (options_.step > 0 || reduced == kStepsReduced) return step;
-      if (runs.differences.spp < settings_.spp) return step;
-      const double smaller = reduced_step(runs.differences, step, windows);
-      if (smaller == step) return step;
-      step = smaller;
+      runs.differences = finite_differences(scene_, options_.parameter, runs.step, fine_,
+                                            settings_of(spp, 0, 1 + reduced));
+      if (options_.step > 0 || reduced == kStepsReduced || runs.differences.spp < spp) return;
+      const double smaller = reduced_step(runs.differences, runs.step, windows_);
+      if (smaller == runs.step) return;
+      runs.step = smaller;
     }
   }
 
-  static bool complete(const Runs& runs, int64_t spp) {
-    return runs.gradient.spp >= spp && runs.differences.spp >= spp;
+  static bool complete(const Runs& runs, const CheckSamples& samples) {
+    return runs.gradient.spp >= samples.gradient && runs.differences.spp >= samples.differences;
+  }
+
+  CheckResult judged(const ProbeScores& places, Runs runs, CheckResult result) const {
+    result.step = runs.step;
+    std::vector<double> z;
+    for (size_t k = 0; k < places.windows; ++k) z.push_back(-places.list[k].score.z);
+    result.windows = summarize(z);
+    result.total =
+        compare_totals(runs.gradient.parameters[0].image_sum,
+                       runs.differences.extrapolated.image_sum, places.list[places.windows].score);
+    result.widened = widened_errors(places);
+    result.p = places.p;
+    const ProbeScore& found = places.list[places.smallest];
+    result.found = found.name;
+    if (result.p < kCheckStageLevel) {
+      if (!confirm(found, runs, result)) return interrupted(std::move(runs), result);
+    }
+    if (result.confirmation && result.confirmation->p < kCheckStageLevel) {
+      if (!result.bends) result.verdict = Verdict::kDisagree;
+    } else if (result.within <= kCheckWanted) {
+      result.verdict = runs.gradient.incomplete ? Verdict::kNotComplete : Verdict::kAgree;
+    }
+    result.gradient = std::move(runs.gradient);
+    result.differences = std::move(runs.differences);
+    return result;
   }
 
   static CheckResult interrupted(Runs runs, CheckResult result) {
@@ -281,25 +358,26 @@ class Checker {
     return result;
   }
 
-  Residual residual_of(const Windows& windows, const Runs& runs, double step) const {
+  Residual residual_of(const Runs& runs) const {
     const Film& film = scene_.film;
     const auto radiance =
         sum_blocks(means(runs.gradient.radiance), film.crop_width, film.crop_height, fine_);
-    return {windows, runs.gradient, runs.differences.extrapolated, radiance, step};
+    return {windows_, runs.gradient, runs.differences.extrapolated, radiance, runs.step, jumps_};
   }
 
   // The second run, which takes the first one's place. False if it was interrupted.
-  bool confirm(const Windows& windows, const ProbeScore& found, Runs& runs, CheckResult& result) {
-    const double step = options_.step > 0 ? options_.step : 0.5 * result.step;
-    const int64_t spp = 2 * static_cast<int64_t>(settings_.spp);
+  bool confirm(const ProbeScore& found, Runs& runs, CheckResult& result) const {
+    if (options_.step <= 0) runs.step *= 0.5;
+    const CheckSamples twice{2 * samples_.gradient, 2 * samples_.differences};
+    const int64_t spp = twice.gradient;
     NonFinite bad[2] = {runs.gradient.non_finite, runs.differences.non_finite};
     runs.gradient = run_(scene_, gradient_options(), settings_of(spp, 1, 0));
-    runs.differences =
-        finite_differences(scene_, options_.parameter, step, fine_, settings_of(spp, 1, 1));
+    runs.differences = finite_differences(scene_, options_.parameter, runs.step, fine_,
+                                          settings_of(twice.differences, 1, 1));
     runs.gradient.non_finite.merge(bad[0]);
     runs.differences.non_finite.merge(bad[1]);
-    if (!complete(runs, spp)) return false;
-    const Residual residual = residual_of(windows, runs, step);
+    if (!complete(runs, twice)) return false;
+    const Residual residual = residual_of(runs);
     // Weights from one half of the batches need not be kept from the other any more.
     Probe probe = found.probe;
     for (size_t k = 0; k < probe[0].size(); ++k) {
@@ -309,10 +387,10 @@ class Checker {
     const double z = score.z;
     const bool same_side = z * found.score.z >= 0;
     const double half = 0.5 * normal_p_value(z);
-    result.confirmation = {spp, step, same_side ? half : 1 - half};
+    result.confirmation = {spp, runs.step, same_side ? half : 1 - half};
     if (std::isnan(z)) result.confirmation->p = 0;
     if (result.confirmation->p >= kCheckStageLevel) return true;
-    const auto bends = explained_by_bend(windows, probe, score, step, spp, runs.gradient.at_kink);
+    const auto bends = explained_by_bend(probe, score, runs, twice.differences);
     if (!bends) return false;
     result.bends = *bends;
     if (!result.bends) suspect_terms(residual, runs, result);
@@ -322,12 +400,12 @@ class Checker {
   // Whether the image bends in the place of the probe, and by so much that half of it, by which a
   // slope of one side is off the mean of both, explains what the score found. A quarter of the
   // samples tells most cases. None if the run was interrupted.
-  std::optional<bool> explained_by_bend(const Windows& windows, const Probe& probe,
-                                        const Score& score, double step, int64_t spp,
-                                        bool at_kink) const {
+  std::optional<bool> explained_by_bend(const Probe& probe, const Score& score, const Runs& runs,
+                                        int64_t spp) const {
+    const bool at_kink = runs.gradient.at_kink;
     const double surely = limit_of_level(kCheckLevel);
     for (const bool last : {false, true}) {
-      const auto bend = find_bend(scene_, options_.parameter, step, windows, probe[0],
+      const auto bend = find_bend(scene_, options_.parameter, runs.step, windows_, probe[0],
                                   settings_of(last ? spp : (spp + 3) / 4, 1, last ? 3 : 2));
       if (!bend) return std::nullopt;
       const auto explains = [&](double most, double error) {
@@ -395,7 +473,13 @@ class Checker {
   const CheckOptions& options_;
   const RunSettings& settings_;
   const GradientRun& run_;
-  int block_ = 0, fine_ = 0;
+  int block_, fine_;
+  Windows windows_;
+  bool jumps_ = true;
+  CheckSamples samples_;
+  int round_ = 0;
+  double natural_step_ = 0, last_step_ = 0;
+  double most_ = std::numeric_limits<double>::infinity();  // of steps
 };
 
 }  // namespace

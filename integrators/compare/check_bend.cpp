@@ -48,15 +48,6 @@ std::vector<Moments::Batch> bend_of_blocks(const Scene& scene, const std::string
   return batches;
 }
 
-// Of what has this mean and standard error, without what noise adds to it: nothing is expected of
-// a normal variable around zero (whose magnitude is root(2 / pi) errors, as is what is taken off),
-// all of one that is far from it, at most half an error too little between.
-double magnitude(double mean, double error) {
-  if (error == 0) return std::fabs(mean);
-  const double z = mean / error;
-  return std::fabs(mean) - 2 / std::sqrt(kPi) * error * std::exp(-0.5 * z * z);
-}
-
 }  // namespace
 
 std::optional<Bend> find_bend(const Scene& scene, const std::string& name, double step,
@@ -80,7 +71,7 @@ std::optional<Bend> find_bend(const Scene& scene, const std::string& name, doubl
   double variance = 0;
   for (size_t k = 0; k < weights.size(); ++k) {
     const double error = std::sqrt(single.variance(k));
-    bend.most += std::fabs(weights[k]) * magnitude(single.mean(k), error);
+    bend.most += std::fabs(weights[k]) * magnitude_without_noise(single.mean(k), error);
     variance += weights[k] * weights[k] * error * error;
   }
   bend.most_error = std::sqrt(variance);

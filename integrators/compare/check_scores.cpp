@@ -112,17 +112,18 @@ std::vector<double> Windows::spread(const std::vector<double>& weights) const {
 
 Residual::Residual(const Windows& windows, const GradientResult& gradient,
                    const DifferenceEstimate& differences, const std::vector<double>& radiance,
-                   double step)
+                   double step, bool jumps)
     : windows_(windows) {
   const ParameterGradient& g = gradient.parameters[0];
   gradient_ = gather(g.total_blocks);
   differences_ = gather(differences.blocks);
-  degrees_ = g.total_blocks.degrees();
+  degrees_ = std::min(g.total_blocks.degrees(), differences.blocks.degrees());
   // Events of size x at such a rate that their mean is m have a variance of |m| x per sample, also
   // in places where none has come.
   const std::vector<double> of_differences = means(differences.blocks);
   const std::vector<double> edges = magnitude_of_edges(gradient, g, of_differences);
-  const double samples = static_cast<double>(g.total_blocks.samples());
+  const auto samples = static_cast<double>(g.total_blocks.samples());
+  const auto difference_samples = static_cast<double>(differences.blocks.samples());
   const double pixels = static_cast<double>(windows.fine()) * windows.fine();
   const EventSizes of_edges = event_sizes(batches_of_edges(gradient));
   const EventSizes of_steps = event_sizes(differences.blocks.kept());
@@ -130,14 +131,15 @@ Residual::Residual(const Windows& windows, const GradientResult& gradient,
     rare_gradient_.magnitude.push_back(edges[i]);
     rare_gradient_.of_mean_size.push_back(edges[i] * of_edges.mean / samples);
     rare_gradient_.of_large_size.push_back(edges[i] * of_edges.large / samples);
-    // Differences may hold all of it as events; one that has not been seen at all as large as the
-    // light of a pixel, over both steps.
+    // Differences may hold all of it as events; a jump that has not been seen at all is as large as
+    // the light of a pixel, over both steps.
     const double all =
         std::max({edges[i], std::fabs(of_differences[i]), std::fabs(g.total_blocks.mean(i))});
-    const double large = std::max(of_steps.large, radiance[i] / pixels / (2 * step));
+    const double jump = jumps ? radiance[i] / pixels / (2 * step) : 0;
+    const double large = std::max(of_steps.large, jump);
     rare_differences_.magnitude.push_back(all);
-    rare_differences_.of_mean_size.push_back(all * of_steps.mean / samples);
-    rare_differences_.of_large_size.push_back(all * large / samples);
+    rare_differences_.of_mean_size.push_back(all * of_steps.mean / difference_samples);
+    rare_differences_.of_large_size.push_back(all * large / difference_samples);
   }
   // A difference of two images of radiance L over 2 h is rounded to some hundred units in the last
   // place of L / h.
@@ -176,9 +178,10 @@ Score Residual::score(const Probe& probe) const {
   Score score;
   score.value = d.mean - g.mean;
   score.batch_error = std::sqrt(g.variance + d.variance + rounding * rounding);
-  score.error =
-      std::sqrt(std::max(g.variance, rare(probe, rare_gradient_)) +
-                std::max(d.variance, rare(probe, rare_differences_)) + rounding * rounding);
+  score.gradient_variance = std::max(g.variance, rare(probe, rare_gradient_));
+  score.difference_variance =
+      std::max(d.variance, rare(probe, rare_differences_)) + rounding * rounding;
+  score.error = std::sqrt(score.gradient_variance + score.difference_variance);
   if (score.value == 0) return score;
   score.z = normal_from_student(score.value / score.error, degrees());
   return score;
@@ -223,6 +226,23 @@ Probe Residual::term_probe(const Moments& term_blocks) const {
     for (double& w : probe[parity]) w = square > 0 ? w / std::sqrt(square) : 0;
   }
   return probe;
+}
+
+double Residual::magnitude(const Moments& blocks) const {
+  Moments windows(windows_.size());
+  for (const Moments::Batch& batch : gather(blocks)) windows.add_batch(batch.sums, batch.samples);
+  double sum = 0;
+  for (size_t k = 0; k < windows.size(); ++k) {
+    sum += magnitude_without_noise(windows.mean(k), std::sqrt(windows.variance(k)));
+  }
+  return std::max(sum, 0.0);
+}
+
+// Around zero the mean magnitude is root(2 / pi) errors, as is what is taken off.
+double magnitude_without_noise(double mean, double error) {
+  if (error == 0) return std::fabs(mean);
+  const double z = mean / error;
+  return std::fabs(mean) - 2 / std::sqrt(kPi) * error * std::exp(-0.5 * z * z);
 }
 
 double student_from_normal(double z, double degrees) {

@@ -44,6 +44,7 @@ struct Score {
   double value = 0;  // differences minus gradient
   double error = 0;
   double batch_error = 0;  // without what rare events that have not come would add
+  double gradient_variance = 0, difference_variance = 0;  // of which the error is made
   double z = 0;
   bool widened() const { return error > batch_error; }
 };
@@ -51,9 +52,10 @@ struct Score {
 // Gradient and differences of one parameter, from independent runs of at least two batches.
 class Residual {
  public:
-  // step: of the differences, for their rounding.
+  // step: of the differences. jumps: whether the image of a sample may jump within it.
   Residual(const Windows& windows, const GradientResult& gradient,
-           const DifferenceEstimate& differences, const std::vector<double>& radiance, double step);
+           const DifferenceEstimate& differences, const std::vector<double>& radiance, double step,
+           bool jumps);
 
   Score score(const Probe& probe) const;
   // Of each window alone; those without any variance and value are left out.
@@ -65,6 +67,8 @@ class Residual {
   Probe term_probe(const Moments& term_blocks) const;
   // The mean of a term (or total) in the windows.
   std::vector<double> mean(const Moments& blocks) const { return windows_.gather(means(blocks)); }
+  // The sum of its magnitudes there, without what noise adds.
+  double magnitude(const Moments& blocks) const;
 
  private:
   using Batches = std::vector<Moments::Batch>;
@@ -79,11 +83,16 @@ class Residual {
   const Windows& windows_;
   Batches gradient_, differences_;  // sums of windows
   Rare rare_gradient_, rare_differences_;
-  double degrees_;                // of freedom, of the gradient
+  double degrees_;                // of freedom, of that run which has fewer
   std::vector<double> rounding_;  // of each window, a standard deviation
 };
 
 // The t value whose score is z.
 double student_from_normal(double z, double degrees);
+
+// The magnitude of what has this mean and standard error, without what noise adds to it: nothing is
+// expected of a normal variable around zero, all of one that is far from it, at most half an error
+// too little between.
+double magnitude_without_noise(double mean, double error);
 
 }  // namespace limn

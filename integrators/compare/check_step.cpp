@@ -8,6 +8,7 @@
 
 #include "integrators/compare/edge_events.h"
 #include "limn/core/error.h"
+#include "limn/core/moved.h"
 #include "limn/core/parameter.h"
 #include "limn/integrators/differences.h"
 #include "limn/integrators/statistics.h"
@@ -15,10 +16,13 @@
 namespace limn {
 namespace {
 
-// Steps of a ladder from the natural one down, each kFactor times the one before. It must reach
+// Steps of a ladder from the largest one down, each kFactor times the one before. It must reach
 // well below what moves in the image: where everything has moved away, no further change shows.
 constexpr int kTrials = 9;
 constexpr double kFactor = 4;
+// The largest step of what moves, in natural ones: edges in differences have a variance that goes
+// with 1 / step, and a natural step is less than a pixel in small images.
+constexpr double kMovedSteps = 16;
 constexpr int kLadders = 2;       // one below the other
 constexpr int kPilotSamples = 8;  // per pixel, at least: variances need some
 constexpr int kPilotPart = 8;     // of the samples of the run
@@ -172,14 +176,16 @@ Found choose_step(const std::vector<DifferenceEstimate>& estimates,
 }  // namespace
 
 double find_check_step(const Scene& scene, const std::string& parameter, const Windows& windows,
-                       const RunSettings& settings) {
+                       double most, const RunSettings& settings) {
   RunSettings pilot = settings;
   pilot.progress = nullptr;
   pilot.spp = std::max(kPilotSamples, settings.spp / kPilotPart);
   pilot.seed = settings.seed + 1;  // not the samples that the run will take
   const Parameter moved = find_parameter(scene, parameter);
   const double least = least_step(scene, moved);
-  double step = moved.natural_step, largest = step;
+  const double beyond = moved_by({&moved, 1}).any() ? kMovedSteps : 1;
+  most = std::min(most, beyond * moved.natural_step);
+  double step = most, largest = step;
   for (int ladder = 0; ladder < kLadders; ++ladder) {
     DifferenceJob job{parameter, {}, {}};
     for (int k = kTrials - 1; k >= 0; --k) {
@@ -194,7 +200,7 @@ double find_check_step(const Scene& scene, const std::string& parameter, const W
     if (!found.below || found.step < least) break;
     largest = job.steps.front();
   }
-  return power_of_two_below(std::min(std::max(step, 2 * least), moved.natural_step));
+  return power_of_two_below(std::min(std::max(step, 2 * least), most));
 }
 
 double rounding_of_moves(const Scene& scene, const Parameter& parameter, double step) {

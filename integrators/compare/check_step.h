@@ -7,12 +7,13 @@
 
 namespace limn {
 
-// The largest step, up to the parameter's natural one, whose differences are biased by less than a
+// The largest step, up to `most` and the parameter's natural one (some of these for what moves
+// shapes, camera or delta lights), whose differences are biased by less than a
 // part of the standard error that their extrapolation will have with settings.spp samples: as a
 // mean over the windows, and of the whole image. From a pilot with a seed of its own. A power of
 // two: moved positions are exact where floats allow it.
 double find_check_step(const Scene& scene, const std::string& parameter, const Windows& windows,
-                       const RunSettings& settings);
+                       double most, const RunSettings& settings);
 
 // The same judged by the run itself, which sees more than the pilot: the step if the run's bias is
 // small enough, else a smaller one.

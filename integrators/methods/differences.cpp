@@ -5,8 +5,10 @@
 #include <memory>
 
 #include "integrators/estimates/batches.h"
+#include "integrators/methods/drawn_alike.h"
 #include "integrators/methods/radiance_estimator.h"
 #include "limn/core/exposure.h"
+#include "limn/core/moved.h"
 #include "limn/core/parameter.h"
 
 namespace limn {
@@ -56,8 +58,14 @@ CentralDifferences central_differences(const Scene& scene, const std::vector<Dif
   CentralDifferences result;
   for (const DifferenceJob& job : jobs) {
     const Parameter parameter = find_parameter(scene, job.parameter);
+    const size_t first = moved.size();
     for (const double step : job.steps) {
       for (const double h : {step, -step}) moved.push_back(parameter.moved(scene, h));
+    }
+    if (!moved_by({&parameter, 1}).any()) {
+      const auto largest = std::max_element(job.steps.begin(), job.steps.end());
+      const size_t farthest = 2 * (largest - job.steps.begin());
+      draw_alike(std::span(moved).subspan(first), farthest, farthest + 1);
     }
     result.estimates.emplace_back(job.combinations.size(), DifferenceEstimate(scene.film, block));
   }
@@ -113,13 +121,10 @@ DifferenceResult finite_differences(const Scene& scene, const std::string& param
       scene, {{parameter, {step, 2 * step}, {{1, 0}, {0, 1}, {4.0 / 3, -1.0 / 3}}}}, block,
       settings);
   auto& estimates = run.estimates[0];
-  return {std::move(estimates[0]),
-          std::move(estimates[1]),
-          std::move(estimates[2]),
-          run.spp,
-          run.cost.rays,
-          run.seconds,
-          std::move(run.non_finite)};
+  return {std::move(estimates[0]), std::move(estimates[1]),
+          std::move(estimates[2]), run.spp,
+          run.cost.rays,           run.seconds,
+          run.setup_seconds,       std::move(run.non_finite)};
 }
 
 }  // namespace limn

@@ -283,7 +283,7 @@ TEST(Paths, BlackSurfacesBeginToShine) {
                   <rgb name="intensity" value="2,3,4"/></emitter>)";
   const Scene scene = make_scene(files, parts);
   for (const char* name : {"soot.reflectance", "coal.reflectance"}) {
-    const CheckResult r = run_check(scene, name, 256);
+    const CheckResult r = run_check(scene, name, 1024);
     EXPECT_EQ(r.verdict, Verdict::kAgree) << name;
     EXPECT_GT(r.total.gradient, 1) << name;
   }

@@ -6,9 +6,11 @@
 #include <cstdlib>
 
 #include "integrators/compare/check_bend.h"
+#include "integrators/compare/check_samples.h"
 #include "integrators/compare/edge_events.h"
 #include "integrators/methods/hair_gaps.h"
 #include "limn/core/rng.h"
+#include "limn/integrators/backward.h"
 #include "limn/integrators/run.h"
 #include "support/meshes.h"
 #include "support/planted.h"
@@ -73,7 +75,7 @@ TEST(CheckVerdict, FewSamplesCannotTell) {
   const CheckResult r = run(planted, 3);
   EXPECT_EQ(r.verdict, Verdict::kCannotTell);
   EXPECT_GT(r.needed_spp, 8);
-  EXPECT_GT(r.power[0].visible, kCheckWanted);
+  EXPECT_GT(r.within, kCheckWanted);
   // Some windows have met no event yet.
   EXPECT_GT(r.widened.windows, 0);
   EXPECT_GT(r.widened.most, 1);
@@ -207,6 +209,60 @@ TEST(CheckVerdict, FacesEdgeOnAtRestForgiveNothing) {
     EXPECT_EQ(r.bends, at_kink);
     EXPECT_EQ(r.verdict, at_kink ? Verdict::kCannotTell : Verdict::kDisagree);
   }
+}
+
+// The image of a wide floor does not change as it is scaled: what both modes have is rounding.
+TEST(CheckReverse, RoundingIsNoError) {
+  const TempFiles files;
+  SceneParts parts;
+  parts.width = parts.height = 4;
+  parts.max_depth = 2;
+  parts.origin = {0.3, 2, 3};
+  parts.body = square("floor", 30, -90, {0, 0, 0}, diffuse("chalk", "0.5, 0.5, 0.5")) +
+               R"(<emitter type="point" id="bulb"><point name="position" x="0.5" y="2" z="0.3"/>
+                  <rgb name="intensity" value="9, 9, 9"/></emitter>)";
+  BackwardOptions options;
+  options.parameters = {"floor.scale"};
+  RunSettings settings;
+  settings.spp = 4096;
+  for (settings.seed = 1; settings.seed < 4; ++settings.seed) {
+    const auto checks = check_reverse(make_scene(files, parts), options, settings);
+    ASSERT_EQ(checks.size(), 1u);
+    EXPECT_LT(std::fabs(checks[0].forward), 1e-12);
+    EXPECT_LT(std::fabs(checks[0].z), 4);
+  }
+}
+
+// As many samples for the gradient and for its differences as give the least error in a time.
+TEST(CheckSamples, AreOfLeastError) {
+  const CheckCost gradient{100, 5, 0.4}, differences{20, 0.5, 3};
+  for (const double seconds : {20.0, 60.0}) {
+    const auto samples = more_samples(gradient, differences, 1e-6, seconds);
+    ASSERT_TRUE(samples);
+    const auto n = static_cast<double>(samples->gradient);
+    const auto m = static_cast<double>(samples->differences);
+    const auto error = [&](double x, double y) { return 0.4 * 100 / x + 3 * 20 / y; };
+    EXPECT_NEAR(n * 0.05 + m * 0.025, seconds, 0.1);
+    for (const double more : {-0.1 * n, 0.1 * n}) {
+      EXPECT_LT(error(n, m), error(n + more, m - more * 0.05 / 0.025));
+    }
+  }
+  // A run is as long as it must be, and not repeated in less time than it took.
+  const auto enough = more_samples(gradient, differences, 0.5, 60);
+  ASSERT_TRUE(enough);
+  EXPECT_LT(static_cast<double>(enough->gradient), 1500);
+  EXPECT_FALSE(more_samples(gradient, differences, 0.5, 5));
+}
+
+// Of what a check with a limit of time takes, the gradient's noise is no more than it must be.
+TEST(CheckVerdict, ATimeIsEnough) {
+  const TempFiles files;
+  Planted planted = planted_term(files, "forest", "camera", 1, 2);
+  RunSettings settings;
+  settings.seconds = 600;
+  const CheckResult r = check(planted.scene, planted.options, settings, planted.run);
+  EXPECT_EQ(r.verdict, Verdict::kAgree);
+  EXPECT_LE(r.within, kCheckWanted);
 }
 
 // Where nothing bends, neither do the magnitudes of many windows add up to much.

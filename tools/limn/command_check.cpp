@@ -23,12 +23,14 @@ std::string two_digits(double value) {
   return fmt::format("{:.0f}", std::round(value / unit) * unit);
 }
 
-// What else to ask for where `spp` samples per pixel tell nothing.
-std::string advice(double needed_spp, int spp) {
-  const double more = std::ceil(std::max(needed_spp, 1.1 * spp));
-  if (more < 1e9) return "take about --spp " + two_digits(more);
+// What else to ask for where a run tells nothing.
+std::string advice(const CheckResult& r, double seconds) {
+  const auto spp = static_cast<double>(r.gradient.spp);
+  const double more = std::max(r.needed_spp / spp, 1.1);
+  if (seconds > 0 && more < 1e6) return "take about --time " + two_digits(more * seconds);
+  if (seconds == 0 && more * spp < 1e9) return "take about --spp " + two_digits(more * spp);
   return fmt::format("{} samples per pixel are too few to tell how many it takes, try --spp {:.0f}",
-                     spp, std::min(100.0 * spp, 1e9));
+                     spp, std::min(100 * spp, 1e9));
 }
 
 std::string percent(double part) {
@@ -37,16 +39,17 @@ std::string percent(double part) {
 
 // "2.1 % of the total, 1.9 % of interior, 6 % of camera"
 std::string power_text(const CheckResult& r) {
+  constexpr double kTold = 0.05;  // of all terms' magnitudes
   std::string text;
   for (const CheckPower& power : r.power) {
-    if (!power.term.empty() && power.negligible()) continue;
+    if (!power.term.empty() && power.share < kTold) continue;
     const std::string of = power.term.empty() ? "the total" : power.term;
     text += (text.empty() ? "" : ", ") + percent(power.visible) + " of " + of;
   }
   return text;
 }
 
-void print_verdict(const CheckResult& r, int spp) {
+void print_verdict(const CheckResult& r, double seconds) {
   if (r.verdict == Verdict::kDisagree && r.suspect.empty()) {
     fmt::print("  DISAGREE at the level {:.0e}: what is wrong looks like no single term\n",
                kCheckLevel);
@@ -55,7 +58,7 @@ void print_verdict(const CheckResult& r, int spp) {
     const Suspicion& s = r.suspicions[r.gradient.term(r.suspect)];
     fmt::print(": the differences hold {:.3g} times of it (z = {:.1f})\n", 1 + s.factor, s.z);
   } else if (r.verdict == Verdict::kAgree) {
-    fmt::print("  agree\n");
+    fmt::print("  agree: an error of {} of the derivative would have shown\n", percent(r.within));
   } else if (r.verdict == Verdict::kNotComplete) {
     fmt::print("  NOT COMPLETE: no error was found, but terms are missing (see the warning)\n");
   } else if (r.bends) {
@@ -65,8 +68,8 @@ void print_verdict(const CheckResult& r, int spp) {
         "a light:\n  the gradient is the slope on one side, and differences are the mean of "
         "both\n");
   } else {
-    fmt::print("  CANNOT TELL: an error of a fifth could have hidden: {}\n",
-               advice(r.needed_spp, spp));
+    fmt::print("  CANNOT TELL: an error of {} of the derivative could have hidden: {}\n",
+               percent(r.within), advice(r, seconds));
   }
 }
 
@@ -83,13 +86,14 @@ std::string widened_text(const CheckResult& r) {
                      times(r.widened.total));
 }
 
-void print_check(const std::string& name, const CheckResult& r, int spp) {
+void print_check(const std::string& name, const CheckResult& r, double seconds) {
   std::string samples;
   for (const TermRun& term : r.gradient.terms) {
     samples += fmt::format("{}{} {:.3g}", samples.empty() ? "" : ", ", term.name, term.samples);
   }
-  fmt::print("{}: {} samples per pixel, {} windows of {} pixels, step {:.3g}\n", name, spp,
-             r.windows.count, r.block, r.step);
+  fmt::print("{}: {} samples per pixel", name, r.gradient.spp);
+  if (r.differences.spp != r.gradient.spp) fmt::print(" ({} of differences)", r.differences.spp);
+  fmt::print(", {} windows of {} pixels, step {:.3g}\n", r.windows.count, r.block, r.step);
   fmt::print("  samples per spp    {}\n", samples);
   fmt::print("  gradient           {:.6g} +- {:.2g} (sum over the image)\n", r.total.gradient,
              r.total.gradient_error);
@@ -107,10 +111,10 @@ void print_check(const std::string& name, const CheckResult& r, int spp) {
                r.confirmation->spp, r.confirmation->step, r.confirmation->p);
   }
   fmt::print("  detectable error   {} (95 % power)\n", power_text(r));
-  print_verdict(r, spp);
+  print_verdict(r, seconds);
 }
 
-json figures_json(const std::string& name, const std::string& film, const CheckResult& r, int spp) {
+json figures_json(const std::string& name, const std::string& film, const CheckResult& r) {
   json samples = json::object(), visible = json::object(), shares = json::object();
   for (const TermRun& term : r.gradient.terms) samples[term.name] = term.samples;
   for (const CheckPower& power : r.power) {
@@ -122,7 +126,8 @@ json figures_json(const std::string& name, const std::string& film, const CheckR
                  {"method", r.gradient.method},
                  {"film", film},
                  {"step", r.step},
-                 {"spp", spp},
+                 {"spp", r.gradient.spp},
+                 {"difference_spp", r.differences.spp},
                  {"samples", samples},
                  {"verdict", verdict_name(r.verdict)},
                  {"level", kCheckLevel},
@@ -130,6 +135,7 @@ json figures_json(const std::string& name, const std::string& film, const CheckR
                  {"smallest_at", r.found},
                  {"visible", visible},
                  {"shares", shares},
+                 {"within", number(r.within)},
                  {"needed_spp", number(r.needed_spp)},
                  {"bends", r.bends},
                  {"gradient_sum", r.total.gradient},
@@ -165,10 +171,12 @@ class CheckCommand final : public Command {
     add_parameter_options(app, parameters_);
     visit_options(options_, OptionAdder(app));
     add_samples_option(app, samples_);
+    add_time_option(app, common_);
     app.add_flag("--reverse", reverse_,
                  "Compare reverse mode with forward mode instead, by the sum over pixels of the "
                  "derivative times a random image. An array parameter moves along a random "
-                 "direction. --method is then a method of backward");
+                 "direction. --method is then a method of backward")
+        ->excludes("--time");
   }
 
   int run(const std::string&) override {
@@ -178,7 +186,7 @@ class CheckCommand final : public Command {
     if (reverse_ && options_.exact_film) {
       throw InputError("--film exact: reverse mode has its film by rays");
     }
-    refuse_samples(*app_, options_.points, {"--spp", "--samples", "--reverse"}, options_);
+    refuse_samples(*app_, options_.points, {"--spp", "--time", "--samples", "--reverse"}, options_);
     if (options_.points == FilmPoints::kFaces) return run_faces(scene);
     if (reverse_) return run_reverse(scene);
     options_.samples = parse_samples(samples_);
@@ -194,14 +202,14 @@ class CheckCommand final : public Command {
       const CheckResult r = check(scene, options_, settings);
       if (r.interrupted) return no_verdict();
       warnings_.add_all(r.gradient.warnings);
-      print_check(parameter, r, settings.spp);
-      report.push_back(figures_json(parameter, kFilms[options_.exact_film], r, settings.spp));
+      print_check(parameter, r, settings.seconds);
+      report.push_back(figures_json(parameter, kFilms[options_.exact_film], r));
       report.back()["sensor"] = sensor_name(scene);
       report.back()["warnings"] = warnings_.lines();
       add_verdict(r.verdict, status);
       NonFinite bad = r.gradient.non_finite;
       bad.merge(r.differences.non_finite);
-      if (const int s = finish_status(bad, settings.spp, settings.spp, "")) status = s;
+      if (const int s = finish_status(bad, 1, 1, "")) status = s;
     }
     write_json(common_.json, report.dump(2));
     return status;

@@ -82,7 +82,10 @@ void bind_result(nb::module_& m) {
       .def_prop_ro("step", field(&CheckResult::step),
                    "Of the differences, in the parameter's unit.")
       .def_prop_ro("needed_spp", field(&CheckResult::needed_spp),
-                   "To see an error of a fifth of all that matters.")
+                   "To see an error of a tenth of the derivative.")
+      .def_prop_ro("within", field(&CheckResult::within),
+                   "The error that would have shown with 95 %, over the sum of all terms' "
+                   "magnitudes.")
       .def_prop_ro("bends", field(&CheckResult::bends),
                    "Whether the image bends where gradient and differences disagree: the gradient "
                    "is the slope on one side.")
@@ -134,13 +137,13 @@ struct CheckCall {
   void take(Arguments& a) {
     add_scene(a, scene);
     a.add("name", "str", "", options.parameter, "of the parameter.");
-    add_run(a, request, progress);
+    add_run(a, request, progress, true);
     visit_options(options, a);
     add_samples(a, options.samples);
   }
 
   nb::object run(const Arguments& given) const {
-    given.refuse_samples(options.points, {"spp", "samples"});
+    given.refuse_samples(options.points, {"spp", "seconds", "samples"});
     if (options.points == FilmPoints::kFaces) {
       return nb::cast(check_exactly(*scene, options, request, progress));
     }

@@ -25,10 +25,9 @@ struct CheckOptions {
 constexpr double kCheckStageLevel = 0.01;
 // The chance that a right gradient is accused.
 constexpr double kCheckLevel = kCheckStageLevel * kCheckStageLevel;
-// A check that could not have seen a fifth of a term cannot tell whether the gradient is right.
-constexpr double kCheckWanted = 0.2;
-// Terms below this share of the sum of all magnitudes need not be seen.
-constexpr double kCheckNegligible = 0.05;
+// A check that could not have seen an error of this part of the derivative, whichever term it looks
+// like, cannot tell whether the gradient is right.
+constexpr double kCheckWanted = 0.1;
 
 // A whole image summed: gradient and differences, each with its standard error.
 struct TotalComparison {
@@ -56,9 +55,10 @@ struct Suspicion {
 // What a check could have seen.
 struct CheckPower {
   std::string term;    // "": all terms together
-  double share = 0;    // of the sum of all terms' magnitudes
+  double share = 0;    // of the sum of all terms' magnitudes, without what noise adds to them
   double visible = 0;  // the error, as a part of the term, that is found with 95 %; may be infinite
-  bool negligible() const { return share < kCheckNegligible; }
+  // The same as a part of the sum of all terms' magnitudes.
+  double of_whole() const { return share > 0 ? share * visible : 0; }
 };
 
 // The run that had to confirm what the first one found.
@@ -87,7 +87,8 @@ struct CheckResult {
   double p = 1;       // of the whole first run: windows, image and terms, paid for all of them
   std::string found;  // where it is smallest: "the whole image", "the camera term", ...
   std::vector<CheckPower> power;             // all terms together, then each
-  double needed_spp = 0;                     // to see kCheckWanted of all that is not negligible
+  double within = 0;                         // the largest CheckPower::of_whole()
+  double needed_spp = 0;                     // for `within` to be kCheckWanted
   std::optional<Confirmation> confirmation;  // if p < kCheckStageLevel
   // What would disagree is no more than half of what the image's slopes before and after the
   // parameter's value differ by, and they do: shapes that touch and part, a face edge-on to a
@@ -106,6 +107,8 @@ using GradientRun =
 // Differences use other seeds than the gradient, so that both are independent, and so does the
 // second run, which takes twice the samples at half the step: a step's bias would shrink there.
 // Only what still disagrees, and where the image does not bend, is accused.
+// settings.seconds: instead of settings.spp samples for both, as many for each as reduce the error
+// most, until an error of kCheckWanted would show or the time is over. A second run takes longer.
 CheckResult check(const Scene& scene, const CheckOptions& options, const RunSettings& settings,
                   const GradientRun& run = gradient);
 

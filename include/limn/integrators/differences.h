@@ -46,6 +46,7 @@ struct DifferenceResult {
   int64_t spp = 0;
   uint64_t rays = 0;
   double seconds = 0;
+  double setup_seconds = 0;
   NonFinite non_finite;
 };
 DifferenceResult finite_differences(const Scene& scene, const std::string& parameter, double step,

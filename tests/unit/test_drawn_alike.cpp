@@ -1,0 +1,103 @@
+// Materials that draw alike: their densities are the same, and are those of what they draw; light
+// that only one of them scatters is not lost; differences have the noise of the derivative.
+#include "integrators/methods/drawn_alike.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "limn/core/bsdf.h"
+#include "limn/core/parameter.h"
+#include "limn/core/rng.h"
+#include "limn/integrators/differences.h"
+#include "limn/integrators/gradient.h"
+#include "support/meshes.h"
+#include "support/running_mean.h"
+#include "support/scenes.h"
+
+namespace limn {
+namespace {
+
+constexpr char kMetal[] = R"(<bsdf type="roughconductor" id="paint"><string name="material"
+    value="none"/><float name="alpha" value="0.2"/></bsdf>)";
+constexpr char kClear[] =
+    R"(<bsdf type="principled" id="paint"><float name="spec_trans" value="0.25"/>
+    <float name="specular" value="0.5"/><float name="roughness" value="0.4"/></bsdf>)";
+
+struct Case {
+  const char* bsdf;
+  const char* parameter;
+  double steps[2];
+};
+constexpr Case kCases[] = {{kMetal, "paint.alpha", {0.1, -0.05}},
+                           {kClear, "paint.spec_trans", {0.25, -0.25}}};
+
+Scene scene_of(const TempFiles& files, const std::string& bsdf) {
+  SceneParts parts;
+  parts.body = square("floor", 3, -90, {0, 0, 0}, bsdf) +
+               square("lamp", 1, 90, {0, 2.5, 1}, area_light("glow", "5, 5, 5"));
+  return make_scene(files, parts);
+}
+
+// What is reflected and passed of uniform light.
+RunningMean albedo(const Bsdf& bsdf, uint64_t seed) {
+  const Vec3d n{0, 0, 1}, wi = normalize(Vec3d{0.5, 0.2, 0.7});
+  RunningMean mean;
+  Rng rng(seed, 0, 0);
+  for (int i = 0; i < 40000; ++i) {
+    const double u1 = rng.uniform(), u2 = rng.uniform();
+    const auto wo = bsdf.sample(n, wi, u1, u2);
+    double weight = 0;
+    if (wo) {
+      const BsdfValue f = bsdf.eval_with_pdf(n, wi, *wo);
+      if (f.pdf > 0) weight = f.value.g / f.pdf;
+    }
+    mean.add(weight);
+  }
+  return mean;
+}
+
+TEST(DrawnAlike, LosesNoLight) {
+  const TempFiles files;
+  for (const Case& c : kCases) {
+    const Scene scene = scene_of(files, c.bsdf);
+    const Parameter parameter = find_parameter(scene, c.parameter);
+    std::vector<Scene> scenes{parameter.moved(scene, c.steps[0]),
+                              parameter.moved(scene, c.steps[1])};
+    std::vector<RunningMean> own;
+    for (const Scene& one : scenes) own.push_back(albedo(*one.shapes[0].bsdf->side(true), 1));
+    draw_alike(scenes, 0, 1);
+    const Bsdf* sides[2] = {scenes[0].shapes[0].bsdf->side(true),
+                            scenes[1].shapes[0].bsdf->side(true)};
+    for (size_t i = 0; i < 2; ++i) {
+      const RunningMean alike = albedo(*sides[i], 2);
+      const double error = std::hypot(own[i].standard_error(), alike.standard_error());
+      EXPECT_LT(std::fabs(own[i].mean() - alike.mean()), 4 * error) << c.parameter << i;
+    }
+    const Vec3d n{0, 0, 1}, wi = normalize(Vec3d{0.5, 0.2, 0.7});
+    Rng rng(3, 0, 0);
+    for (int k = 0; k < 20; ++k) {
+      const auto wo = sides[0]->sample(n, wi, rng.uniform(), rng.uniform());
+      if (!wo) continue;
+      EXPECT_EQ(sides[0]->pdf_solid_angle(n, wi, *wo), sides[1]->pdf_solid_angle(n, wi, *wo));
+    }
+    // The lamp's material is the same in both.
+    EXPECT_EQ(scenes[0].shapes[1].bsdf->describe(), scene.shapes[1].bsdf->describe());
+  }
+}
+
+TEST(DrawnAlike, LeavesTheNoiseOfTheDerivative) {
+  const TempFiles files;
+  const Scene scene = scene_of(files, kMetal);
+  RunSettings settings;
+  settings.spp = 64;
+  GradientOptions options;
+  options.parameters = {"paint.alpha"};
+  const GradientResult g = gradient(scene, options, settings);
+  const DifferenceResult d = finite_differences(scene, "paint.alpha", 0.002, 0, settings);
+  const Moments& sum = g.parameters[0].image_sum;
+  EXPECT_LT(d.at_step.image_sum.variance(0), 4 * sum.variance(0));
+}
+
+}  // namespace
+}  // namespace limn
