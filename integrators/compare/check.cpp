@@ -13,6 +13,7 @@
 #include "integrators/compare/check_scores.h"
 #include "integrators/compare/check_step.h"
 #include "integrators/terms/term.h"
+#include "limn/core/blur_tracer.h"
 #include "limn/core/moved.h"
 #include "limn/core/parameter.h"
 #include "limn/integrators/methods.h"
@@ -211,6 +212,7 @@ class Checker {
     const Parameter parameter = find_parameter(scene, options.parameter);
     natural_step_ = parameter.natural_step;
     jumps_ = moved_in(scene, {&parameter, 1}).any() || find_smooth(scene);
+    if (options.method->blurs) blur_ = resolved(options.method->blurred_by(options.blur), scene);
   }
 
   CheckResult check() {
@@ -256,6 +258,7 @@ class Checker {
     gradient_options.block = fine_;
     gradient_options.samples = options_.samples;
     gradient_options.warp = options_.warp;
+    if (blur_) gradient_options.blur = *blur_;
     gradient_options.exact_film = options_.exact_film;
     return gradient_options;
   }
@@ -301,7 +304,7 @@ class Checker {
       // A longer run's step is no larger but by chance.
       const double most = round_ == 0 ? most_ : std::min(most_, 4 * last_step_);
       runs.step = find_check_step(scene_, options_.parameter, windows_, most,
-                                  settings_of(samples_.differences, 0, 0));
+                                  settings_of(samples_.differences, 0, 0), blur_);
     }
     run_at_small_step(runs);
     runs.seconds = watch.seconds();
@@ -314,7 +317,7 @@ class Checker {
     const int64_t spp = samples_.differences;
     for (int reduced = 0;; ++reduced) {
       runs.differences = finite_differences(scene_, options_.parameter, runs.step, fine_,
-                                            settings_of(spp, 0, 1 + reduced));
+                                            settings_of(spp, 0, 1 + reduced), blur_);
       if (options_.step > 0 || reduced == kStepsReduced || runs.differences.spp < spp) return;
       const double smaller = reduced_step(runs.differences, runs.step, windows_);
       if (smaller == runs.step) return;
@@ -373,7 +376,7 @@ class Checker {
     NonFinite bad[2] = {runs.gradient.non_finite, runs.differences.non_finite};
     runs.gradient = run_(scene_, gradient_options(), settings_of(spp, 1, 0));
     runs.differences = finite_differences(scene_, options_.parameter, runs.step, fine_,
-                                          settings_of(twice.differences, 1, 1));
+                                          settings_of(twice.differences, 1, 1), blur_);
     runs.gradient.non_finite.merge(bad[0]);
     runs.differences.non_finite.merge(bad[1]);
     if (!complete(runs, twice)) return false;
@@ -406,7 +409,7 @@ class Checker {
     const double surely = limit_of_level(kCheckLevel);
     for (const bool last : {false, true}) {
       const auto bend = find_bend(scene_, options_.parameter, runs.step, windows_, probe[0],
-                                  settings_of(last ? spp : (spp + 3) / 4, 1, last ? 3 : 2));
+                                  settings_of(last ? spp : (spp + 3) / 4, 1, last ? 3 : 2), blur_);
       if (!bend) return std::nullopt;
       const auto explains = [&](double most, double error) {
         const double excess = std::fabs(score.value) - 0.5 * most;
@@ -480,6 +483,7 @@ class Checker {
   int round_ = 0;
   double natural_step_ = 0, last_step_ = 0;
   double most_ = std::numeric_limits<double>::infinity();  // of steps
+  std::optional<Blur> blur_;  // none: images are sharp
 };
 
 }  // namespace
@@ -493,6 +497,7 @@ CheckResult check(const Scene& scene, const CheckOptions& options, const RunSett
   if (method->check) method->check(scene);
   if (options.exact_film) check_exact_film(scene, method);
   check_warp(options.warp, {method});
+  check_blur(options.blur, {method});
   return Checker(scene, options, settings, run).check();
 }
 

@@ -13,10 +13,11 @@ namespace {
 // (I(reach) - I(0)) / reach in batches, with negative reach on the side before: a central
 // difference around half the way. No batches if the run was interrupted.
 std::vector<Moments::Batch> slope_of_blocks(const Scene& scene, const std::string& name,
-                                            double reach, int block, const RunSettings& settings) {
+                                            double reach, int block, const RunSettings& settings,
+                                            const std::optional<Blur>& blur) {
   const DifferenceJob job{name, {0.5 * std::fabs(reach)}, {{1}}};
   const CentralDifferences run = central_differences(
-      find_parameter(scene, name).moved(scene, 0.5 * reach), {job}, block, settings);
+      find_parameter(scene, name).moved(scene, 0.5 * reach), {job}, block, settings, false, blur);
   if (run.spp < settings.spp) return {};
   return run.estimates[0][0].blocks.kept();
 }
@@ -25,7 +26,8 @@ std::vector<Moments::Batch> slope_of_blocks(const Scene& scene, const std::strin
 // small r where the image bends by K, and 2 X(r) - X(2 r) = K. All from the same samples. No
 // batches if the run was interrupted.
 std::vector<Moments::Batch> bend_of_blocks(const Scene& scene, const std::string& name, double step,
-                                           int block, const RunSettings& settings) {
+                                           int block, const RunSettings& settings,
+                                           const std::optional<Blur>& blur) {
   std::vector<Moments::Batch> batches;
   RunSettings own = settings;
   int done = 0;
@@ -34,7 +36,7 @@ std::vector<Moments::Batch> bend_of_blocks(const Scene& scene, const std::string
   }
   for (const auto& [reach, factor] : {std::pair{step, 2.0}, {2 * step, -1.0}}) {
     for (const double side : {1.0, -1.0}) {
-      auto more = slope_of_blocks(scene, name, side * reach, block, own);
+      auto more = slope_of_blocks(scene, name, side * reach, block, own, blur);
       if (more.empty() || (done > 0 && batches.size() != more.size())) return {};
       if (done++ == 0) {
         batches = more;
@@ -52,8 +54,8 @@ std::vector<Moments::Batch> bend_of_blocks(const Scene& scene, const std::string
 
 std::optional<Bend> find_bend(const Scene& scene, const std::string& name, double step,
                               const Windows& windows, const std::vector<double>& weights,
-                              const RunSettings& settings) {
-  const auto batches = bend_of_blocks(scene, name, step, windows.fine(), settings);
+                              const RunSettings& settings, const std::optional<Blur>& blur) {
+  const auto batches = bend_of_blocks(scene, name, step, windows.fine(), settings, blur);
   const std::vector<double> of_blocks = windows.spread(weights);
   Moments moments(1), single(windows.size());
   for (const Moments::Batch& batch : batches) {

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "integrators/compare/check_scores.h"
+#include "limn/core/blur.h"
 #include "limn/core/scene.h"
 #include "limn/integrators/run.h"
 
@@ -19,9 +20,11 @@ struct Bend {
 
 // The slope after the parameter's value minus the slope before it, from one-sided differences over
 // 2 step and step. What grows in proportion to the step is taken off: an image that is curved does
-// not bend. weights: one for each window. None if the run was interrupted.
+// not bend. weights: one for each window. blur: see central_differences(). None if the run was
+// interrupted.
 std::optional<Bend> find_bend(const Scene& scene, const std::string& parameter, double step,
                               const Windows& windows, const std::vector<double>& weights,
-                              const RunSettings& settings);
+                              const RunSettings& settings,
+                              const std::optional<Blur>& blur = std::nullopt);
 
 }  // namespace limn

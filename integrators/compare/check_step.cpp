@@ -176,7 +176,8 @@ Found choose_step(const std::vector<DifferenceEstimate>& estimates,
 }  // namespace
 
 double find_check_step(const Scene& scene, const std::string& parameter, const Windows& windows,
-                       double most, const RunSettings& settings) {
+                       double most, const RunSettings& settings,
+                       const std::optional<Blur>& blur) {
   RunSettings pilot = settings;
   pilot.progress = nullptr;
   pilot.spp = std::max(kPilotSamples, settings.spp / kPilotPart);
@@ -193,7 +194,8 @@ double find_check_step(const Scene& scene, const std::string& parameter, const W
       if (trial >= least || k == 0) job.steps.push_back(trial);
     }
     job.combinations = steps_and_changes(job.steps.size());
-    const CentralDifferences run = central_differences(scene, {job}, windows.fine(), pilot);
+    const CentralDifferences run =
+        central_differences(scene, {job}, windows.fine(), pilot, false, blur);
     if (run.spp < 2) break;
     const Found found = choose_step(run.estimates[0], job.steps, windows, settings.spp);
     step = found.step;

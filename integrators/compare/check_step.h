@@ -1,6 +1,9 @@
 #pragma once
 // The step at which a gradient is checked against differences.
+#include <optional>
+
 #include "integrators/compare/check_scores.h"
+#include "limn/core/blur.h"
 #include "limn/core/parameter.h"
 #include "limn/core/scene.h"
 #include "limn/integrators/run.h"
@@ -11,9 +14,10 @@ namespace limn {
 // shapes, camera or delta lights), whose differences are biased by less than a
 // part of the standard error that their extrapolation will have with settings.spp samples: as a
 // mean over the windows, and of the whole image. From a pilot with a seed of its own. A power of
-// two: moved positions are exact where floats allow it.
+// two: moved positions are exact where floats allow it. blur: see central_differences().
 double find_check_step(const Scene& scene, const std::string& parameter, const Windows& windows,
-                       double most, const RunSettings& settings);
+                       double most, const RunSettings& settings,
+                       const std::optional<Blur>& blur);
 
 // The same judged by the run itself, which sees more than the pilot: the step if the run's bias is
 // small enough, else a smaller one.

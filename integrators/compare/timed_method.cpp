@@ -51,6 +51,7 @@ GradientOptions MethodInput::options(const Method& method) const {
   options.samples = samples;
   options.step = step;
   if (method->warps) options.warp = warp;
+  if (method->blurs) options.blur = blur;
   options.block = block;
   options.exact_film = exact_film && method->terms_can_be_left_out;
   return options;

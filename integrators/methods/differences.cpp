@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "integrators/estimates/batches.h"
+#include "integrators/methods/blurred_estimator.h"
 #include "integrators/methods/drawn_alike.h"
 #include "integrators/methods/radiance_estimator.h"
 #include "limn/core/exposure.h"
@@ -51,7 +52,8 @@ void DifferenceEstimate::add_batch(const std::vector<double>& sums, const Film& 
 }
 
 CentralDifferences central_differences(const Scene& scene, const std::vector<DifferenceJob>& jobs,
-                                       int block, const RunSettings& settings, bool even) {
+                                       int block, const RunSettings& settings, bool even,
+                                       const std::optional<Blur>& blur) {
   const Stopwatch watch;
   const Numbers numbers = even ? Numbers::kEvenInBatches : Numbers::kIndependent;
   std::vector<Scene> moved;
@@ -71,6 +73,15 @@ CentralDifferences central_differences(const Scene& scene, const std::vector<Dif
   }
   const auto at = [&](const auto& placed) {
     const auto unmoved = placed(scene);
+    if (blur) {
+      const auto choices = std::make_shared<const BlurredScene>(*unmoved, *blur, settings.threads);
+      EstimatorsAtTime now{{unmoved, choices}};
+      for (const Scene& one : moved) {
+        now.list.push_back(
+            std::make_unique<BlurredEstimator>(one, *choices, settings.threads, numbers));
+      }
+      return now;
+    }
     const auto choices = std::make_shared<const PathChoices>(*unmoved);
     EstimatorsAtTime now{{unmoved, choices}};
     for (const Scene& one : moved) {
@@ -116,10 +127,11 @@ CentralDifferences central_differences(const Scene& scene, const std::vector<Dif
 }
 
 DifferenceResult finite_differences(const Scene& scene, const std::string& parameter, double step,
-                                    int block, const RunSettings& settings) {
+                                    int block, const RunSettings& settings,
+                                    const std::optional<Blur>& blur) {
   CentralDifferences run = central_differences(
       scene, {{parameter, {step, 2 * step}, {{1, 0}, {0, 1}, {4.0 / 3, -1.0 / 3}}}}, block,
-      settings);
+      settings, false, blur);
   auto& estimates = run.estimates[0];
   return {std::move(estimates[0]), std::move(estimates[1]),
           std::move(estimates[2]), run.spp,

@@ -36,6 +36,7 @@ void check_selection(const Scene& scene, const GradientOptions& options) {
   if (options.exact_film) check_exact_film(scene, method);
   if (method->check) method->check(scene);
   check_warp(options.warp, {method});
+  check_blur(options.blur, {method});
   check_points(options.points, method->closed_light, method.name());
   if (options.terms.empty() || method->terms_can_be_left_out) return;
   throw InputError("terms: the method \"" + method.name() + "\" has all terms in one");
@@ -53,6 +54,7 @@ void identify(const Scene& scene, const GradientOptions& options, BatchStore& st
   store.identify("samples", !options.samples ? (options.uniform_samples ? "uniform" : "auto")
                                              : to_string(*options.samples));
   store.identify("warp", fmt::format("{} rays, kappa {}", options.warp.rays, options.warp.kappa));
+  store.identify("blur", fmt::format("{}, {}", options.blur.sigma, options.blur.gamma));
   store.identify("film", options.exact_film ? "exact" : "rays");
   store.identify("step", fmt::format("{}", options.step));
 }

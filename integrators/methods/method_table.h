@@ -1,12 +1,16 @@
 #pragma once
 // The methods: a file of its own each, and one row. Included by methods.cpp, and by the methods.
 #include "integrators/methods/term_methods.h"
+#include "integrators/paths/blurred_scene.h"
 #include "limn/integrators/methods.h"
 
 namespace limn {
 
 GradientResult run_differences(const MethodType& method, const Scene& scene,
                                const GradientOptions& options, const RunSettings& settings);
+
+GradientResult run_blurred(const MethodType& method, const Scene& scene,
+                           const GradientOptions& options, const RunSettings& settings);
 
 // All but those that work term by term.
 inline std::vector<MethodType> other_methods() {
@@ -31,7 +35,23 @@ inline std::vector<MethodType> other_methods() {
                }},
           {.name = "rays",
            .description = "direct light, ambient occlusion and open sky, by quasi-random rays",
-           .image = ImageMethod{.looks_around = true}}};
+           .image = ImageMethod{.looks_around = true}},
+          {.name = "blurred",
+           .description = "a scene of blurred faces: smooth, biased for the sharp one",
+           .terms = {"blurred"},
+           .blurs = BlurWeights::kOrdered,
+           .biased = true,
+           .check = check_blurred,
+           .image = ImageMethod{},
+           .run = run_blurred},
+          {.name = "blurred-published",
+           .description = "the same with weights by depth alone (Quinn 2021)",
+           .terms = {"blurred"},
+           .blurs = BlurWeights::kPublished,
+           .biased = true,
+           .check = check_blurred,
+           .image = ImageMethod{},
+           .run = run_blurred}};
 }
 
 }  // namespace limn

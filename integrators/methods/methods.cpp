@@ -119,6 +119,13 @@ void check_task(const Method& method, Task task) {
                    ")");
 }
 
+void check_blur(const Blur& blur, const std::vector<Method>& methods) {
+  if (blur.sigma == 0 && blur.gamma == 0) return;
+  const auto blurs = [](const Method& method) { return method->blurs.has_value(); };
+  if (std::ranges::any_of(methods, blurs)) return;
+  throw InputError("sigma and gamma are for the methods blurred and blurred-published");
+}
+
 void check_warp(const WarpOptions& warp, const std::vector<Method>& methods) {
   if (warp.rays == WarpOptions{}.rays && warp.kappa == WarpOptions{}.kappa) return;
   std::vector<std::string> names, takers;

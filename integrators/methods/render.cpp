@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "integrators/estimates/batches.h"
+#include "integrators/methods/blurred_estimator.h"
 #include "integrators/methods/faces_estimator.h"
 #include "integrators/methods/radiance_estimator.h"
 #include "integrators/methods/render_seeds.h"
@@ -68,6 +69,14 @@ std::unique_ptr<SampleEstimator> make_estimator(const Scene& scene, const RunSet
     }
     return std::make_unique<VisibilityEstimator>(scene, settings, options);
   }
+  if (options.method->blurs) {
+    if (options.exact_film) {
+      throw FieldError("film", "exact is not for the method \"" + options.method.name() + "\"");
+    }
+    const Blur blur = resolved(options.method->blurred_by(options.blur), scene);
+    return std::make_unique<BlurredEstimator>(scene, blur, std::span<const Parameter>(),
+                                              settings.threads, numbers);
+  }
   std::shared_ptr<const FilmRegions> visible;
   if (options.exact_film) {
     visible = std::make_shared<FilmRegions>(scene, settings.threads, settings.interrupted);
@@ -82,6 +91,7 @@ void identify(BatchStore& store, const RenderOptions& options) {
   store.identify("method", options.method.name());
   if (!method.looks_around) {
     store.identify("generator", options.generator);
+    store.identify("blur", fmt::format("{}, {}", options.blur.sigma, options.blur.gamma));
     store.identify("film", options.exact_film ? "exact" : "rays");
     return;
   }
@@ -149,6 +159,7 @@ RenderResult render(const Scene& scene, const RunSettings& asked, const RenderOp
   const Stopwatch watch;
   const RunSettings settings = settings_for(options.points, asked);
   check_task(options.method, Task::kImage);
+  check_blur(options.blur, {options.method});
   if (settings.store) identify(*settings.store, options);
   const EstimatorList estimators = estimators_of(scene, settings, options);
   const auto* around = dynamic_cast<const VisibilityEstimator*>(estimators[0].get());
@@ -157,6 +168,10 @@ RenderResult render(const Scene& scene, const RunSettings& asked, const RenderOp
     settings.store->identify("choice of the pilot", fingerprint(around->choice()));
   }
   RenderResult result = run(scene, estimators, settings, watch, options);
+  if (options.method->blurs) {
+    result.warnings.push_back(
+        bias_of_blur(scene, resolved(options.method->blurred_by(options.blur), scene)));
+  }
   if (around && around->missed() > 0) {
     result.warnings.push_back(fmt::format(
         "{} integrals did not reach the tolerance {} with {} lines: ask for a larger one",

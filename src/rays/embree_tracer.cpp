@@ -14,6 +14,7 @@
 #include <string>
 #include <type_traits>
 
+#include "limn/core/blur_tracer.h"
 #include "limn/core/check.h"
 #include "limn/core/coincident_faces.h"
 #include "limn/core/error.h"
@@ -337,7 +338,122 @@ class EmbreeTracer final : public RayTracer {
   Owned<RTCScene> rtc_scene_;
 };
 
+// Of blurred faces, each as triangles that cover all of it.
+class EmbreeBlurTracer final : public BlurTracer {
+ public:
+  EmbreeBlurTracer(const BlurFaces& faces, int threads)
+      : faces_(faces),
+        origin_(origin_of(faces.scene())),
+        pieces_(faces.scene().shapes.size()),
+        device_(rtcNewDevice(nullptr)) {
+    if (!device_) throw InputError("Embree cannot start on this machine");
+    rtcSetDeviceErrorFunction(device_.get(), EmbreeErrors::note, &errors_);
+    rtc_scene_.reset(rtcNewScene(device_.get()));
+    errors_.check();
+    rtcSetSceneFlags(rtc_scene_.get(),
+                     static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | kFilterOfQuery));
+    rtcSetSceneBuildQuality(rtc_scene_.get(), RTC_BUILD_QUALITY_MEDIUM);
+    for (uint32_t s = 0; s < pieces_.size(); ++s) attach(ShapeId(s));
+    parallel_for(1, threads, [&](size_t) { rtcJoinCommitScene(rtc_scene_.get()); });
+    errors_.check();
+  }
+
+  void hits(const Ray& ray, std::vector<BlurHit>& hits) const override {
+    hits.clear();
+    collect(ray, true, hits);
+    const double depth = faces_.blur().depth();
+    if (depth > 0 && !hits.empty()) {
+      // What mixes with the first opaque face: the rays ends behind it.
+      Ray cut = ray;
+      for (const BlurHit& hit : hits) {
+        if (hit.opacity == 1) cut.t_max = std::min(cut.t_max, hit.t + depth);
+      }
+      hits.clear();
+      collect(cut, false, hits);
+    }
+    if (hits.size() > kMostBlurHits) {
+      throw InputError("a ray meets " + std::to_string(hits.size()) + " blurred faces: sigma " +
+                       std::to_string(faces_.blur().sigma) +
+                       " is too large for sides whose median is " +
+                       std::to_string(median_side(faces_.scene())));
+    }
+    faces_.settle(ray, hits);
+  }
+
+ private:
+  struct Query {
+    QueryContext base;  // first, as in Context
+    const EmbreeBlurTracer* tracer;
+    const Ray* ray;
+    std::vector<BlurHit>* hits;
+    bool ends;  // at an opaque face
+  };
+  static void note_hit(const RTCFilterFunctionNArguments* arguments) {
+    const auto& query = *reinterpret_cast<const Query*>(arguments->context);
+    const ShapeId shape(RTCHitN_geomID(arguments->hit, 1, 0));
+    const uint32_t piece = RTCHitN_primID(arguments->hit, 1, 0);
+    const FaceId face(query.tracer->pieces_[shape.index()][piece]);
+    const auto hit = query.tracer->faces_.meet(*query.ray, {shape, face});
+    if (hit) query.hits->push_back(*hit);
+    if (!hit || hit->opacity < 1 || !query.ends) arguments->valid[0] = 0;
+  }
+  void collect(const Ray& ray, bool ends, std::vector<BlurHit>& hits) const {
+    Query query;
+    start(query.base, note_hit);
+    query.tracer = this;
+    query.ray = &ray;
+    query.hits = &hits;
+    query.ends = ends;
+    RTCRayHit rtc;
+    rtc.ray = to_embree(ray, origin_);
+    rtc.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    rtc.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+    intersect(rtc_scene_.get(), query.base, rtc);
+  }
+  void attach(ShapeId id) {
+    constexpr double kMargin = 1.01;  // for the rounding to floats, where opacities are almost 0
+    const Mesh& mesh = faces_.scene().shape(id).mesh;
+    std::vector<Vec3f> corners;
+    for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
+      if (!has_area(mesh, mesh.faces[f])) continue;
+      const std::vector<Vec3d> polygon =
+          enlarged_face(face_corners<double>(mesh, FaceId(f)), kMargin * faces_.blur().reach());
+      for (size_t k = 2; k < polygon.size(); ++k) {
+        for (const Vec3d& x : {polygon[0], polygon[k - 1], polygon[k]}) {
+          corners.push_back(cast<float>(x - origin_));
+        }
+        pieces_[id.index()].push_back(f);
+      }
+    }
+    const Owned<RTCGeometry> geometry(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_TRIANGLE));
+    errors_.check();
+    auto* vertices = static_cast<Vec3f*>(
+        rtcSetNewGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                sizeof(Vec3f), corners.size()));
+    auto* faces = static_cast<FaceIndices*>(
+        rtcSetNewGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                sizeof(FaceIndices), corners.size() / 3));
+    errors_.check();
+    std::copy(corners.begin(), corners.end(), vertices);
+    for (uint32_t k = 0; k < corners.size() / 3; ++k) faces[k] = {3 * k, 3 * k + 1, 3 * k + 2};
+    rtcCommitGeometry(geometry.get());
+    rtcAttachGeometryByID(rtc_scene_.get(), geometry.get(), id.index());
+    errors_.check();
+  }
+
+  const BlurFaces& faces_;
+  Vec3d origin_;
+  std::vector<std::vector<uint32_t>> pieces_;  // of each shape: the face of each triangle
+  EmbreeErrors errors_;                        // must be declared before the device
+  Owned<RTCDevice> device_;
+  Owned<RTCScene> rtc_scene_;
+};
+
 }  // namespace
+
+std::unique_ptr<BlurTracer> make_blur_tracer(const BlurFaces& faces, int threads) {
+  return std::make_unique<EmbreeBlurTracer>(faces, threads);
+}
 
 std::unique_ptr<RayTracer> make_embree_tracer(const Scene& scene, int threads) {
   return make_embree_tracer(scene, threads, nullptr);

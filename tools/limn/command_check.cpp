@@ -183,6 +183,7 @@ class CheckCommand final : public Command {
     const Scene scene = load_scene(common_, warnings_);
     check_outputs({{"--json", common_.json}}, scene, field_files(parameters_));
     check_warp(options_.warp, {reverse_ ? reverse_method() : options_.method});
+    check_blur(options_.blur, {reverse_ ? reverse_method() : options_.method});
     if (reverse_ && options_.exact_film) {
       throw InputError("--film exact: reverse mode has its film by rays");
     }

@@ -149,7 +149,8 @@ class Comparer {
                block_size(scene.film),
                parse_samples(command.samples),
                command.gradient.warp,
-               command.gradient.exact_film},
+               command.gradient.exact_film,
+               command.gradient.blur},
         identity_(identify(input_, common.defines)),
         kept_file_((fs::path(command.output) / "reference.exr").string()) {
     result_.command = command_line;
@@ -301,7 +302,8 @@ void CompareCommand::add_options(CLI::App& app) {
       ->excludes(wrt);
   const OptionAdder add(app);
   command_.render.generator = kGenerators[0];
-  visit_options(command_.render, all_but({"method", "generator", "film", "points"}, add));
+  visit_options(command_.render,
+                all_but({"method", "generator", "film", "points", "sigma", "gamma"}, add));
   app.add_option("--methods", command_.methods,
                  "Methods to compare; ratios are relative to the first: " +
                      limn::join(method_names(Task::kGradient)) + ", " + kMitsuba + ", " +
@@ -348,6 +350,7 @@ void CompareCommand::check_images() {
   refuse_options(*app_, {"--terms", "--samples", "--step", "--aux", "--kappa", "--no-report"},
                  "derivatives alone have that: not with --image");
   command_.render.exact_film = command_.gradient.exact_film;
+  command_.render.blur = command_.gradient.blur;
   command_.report = false;
   check_methods_of_images(*app_, command_);
 }
@@ -360,6 +363,7 @@ std::vector<Method> CompareCommand::check_derivatives() const {
   }
   const std::vector<Method> methods = check_methods(command_.methods, command_.gradient.terms);
   check_warp(command_.gradient.warp, methods);
+  check_blur(command_.gradient.blur, methods);
   return methods;
 }
 

@@ -72,6 +72,7 @@ void check_call(const Scene& scene, const CompareCall& call, const std::vector<M
   for (const Method& method : methods) check_task(method, Task::kGradient);
   if (methods.empty()) throw InputError("compare needs a method or more");
   check_warp(call.options.warp, methods);
+  check_blur(call.options.blur, methods);
   if (call.options.exact_film) check_exact_films(scene, methods);
   if (call.repeats < 1) throw InputError("repeats must be 1 or more");
   double before = 0;
@@ -87,9 +88,15 @@ Comparison CompareCall::run(const Arguments& /*given*/) const {
   const std::vector<Method> chosen(methods.begin(), methods.end());
   check_call(*shared, *this, chosen);
   const int width = shared->film.crop_width, height = shared->film.crop_height;
-  const MethodInput input{
-      *shared,           name, {}, 0, block_size(shared->film), std::nullopt, options.warp,
-      options.exact_film};
+  const MethodInput input{*shared,
+                          name,
+                          {},
+                          0,
+                          block_size(shared->film),
+                          std::nullopt,
+                          options.warp,
+                          options.exact_film,
+                          options.blur};
   double all = 0;
   for (const double time : times) all += time * repeats;
   Reference reference;

@@ -1,5 +1,8 @@
 #pragma once
 // Central finite differences of images with common random numbers.
+#include <optional>
+
+#include "limn/core/blur.h"
 #include "limn/core/scene.h"
 #include "limn/integrators/moments.h"
 #include "limn/integrators/run.h"
@@ -35,8 +38,10 @@ struct CentralDifferences {
 };
 // All jobs and steps share their random numbers. even: these are even in each batch (Rng::even),
 // for less error, mostly. What `check` tells of steps and of rare events is of independent ones.
+// blur: of images of blurred faces, as resolved() has it.
 CentralDifferences central_differences(const Scene& scene, const std::vector<DifferenceJob>& jobs,
-                                       int block, const RunSettings& settings, bool even = false);
+                                       int block, const RunSettings& settings, bool even = false,
+                                       const std::optional<Blur>& blur = std::nullopt);
 
 // Central differences for the steps h and 2h, and their Richardson combination
 // (4 D_h - D_2h) / 3, whose bias is of order h^4. All from the same samples; standard errors from
@@ -50,6 +55,7 @@ struct DifferenceResult {
   NonFinite non_finite;
 };
 DifferenceResult finite_differences(const Scene& scene, const std::string& parameter, double step,
-                                    int block, const RunSettings& settings);
+                                    int block, const RunSettings& settings,
+                                    const std::optional<Blur>& blur = std::nullopt);
 
 }  // namespace limn

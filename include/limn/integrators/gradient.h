@@ -15,6 +15,7 @@
 #include <variant>
 #include <vector>
 
+#include "limn/core/blur.h"
 #include "limn/core/scene.h"
 #include "limn/edgetree/edges.h"
 #include "limn/integrators/film_points.h"
@@ -70,6 +71,7 @@ struct GradientOptions {
   // terms are one, `faces`, and there are no samples of terms.
   FilmPoints points = FilmPoints::kRandom;
   WarpOptions warp;
+  Blur blur;  // of methods that blur; 0: see resolved()
 };
 
 // Derivative images of one parameter, crop_height by crop_width by 3, per unit of the parameter.

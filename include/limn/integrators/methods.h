@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "limn/core/blur.h"
 #include "limn/core/settings.h"
 #include "limn/edgetree/edge_sampler_types.h"
 #include "limn/integrators/gradient.h"
@@ -42,9 +43,10 @@ struct MethodType {
   bool terms_can_be_left_out = false;
   // The single terms depend on choices that the run makes; their sum does not.
   bool only_sum_fixed = false;
-  bool closed_light = false;  // it takes GradientOptions::points
-  bool warps = false;         // it takes GradientOptions::warp
-  bool biased = false;        // its mean is not the derivative, however many samples it takes
+  bool closed_light = false;                        // it takes GradientOptions::points
+  bool warps = false;                               // it takes GradientOptions::warp
+  std::optional<BlurWeights> blurs = std::nullopt;  // its faces are blurred: it takes a Blur
+  bool biased = false;  // its mean is not the derivative, however many samples it takes
   // InputError, with the place, for a scene that the method cannot take; null: it takes all.
   void (*check)(const Scene&) = nullptr;
   // What it can do: images, derivative images, reverse mode (and fits by it).
@@ -60,6 +62,11 @@ struct MethodType {
 
   bool can(Task task) const;
   bool is_variant() const { return !settings.text().empty(); }
+  // With the weights of a method that blurs.
+  Blur blurred_by(Blur blur) const {
+    blur.weights = *blurs;
+    return blur;
+  }
 };
 
 const std::vector<MethodType>& method_types();
@@ -68,5 +75,6 @@ std::vector<std::string> method_names(Task task);
 
 // InputError if the options are not the defaults and none of the methods takes them.
 void check_warp(const WarpOptions& warp, const std::vector<Method>& methods);
+void check_blur(const Blur& blur, const std::vector<Method>& methods);
 
 }  // namespace limn

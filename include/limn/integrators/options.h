@@ -75,6 +75,20 @@ void visit_options(Like<WarpOptions> auto& o, auto&& visit) {
                      .typed("K"));
 }
 
+void visit_options(Like<Blur> auto& o, auto&& visit) {
+  visit(o.sigma, Option{"sigma",
+                        "Square of the width over which faces fade beyond their sides, in scene "
+                        "units (methods blurred and blurred-published)",
+                        1e-30L, 1e30L}
+                     .or_zero("a sixteenth of the median side, squared"));
+  visit(o.gamma,
+        Option{"gamma",
+               "Depth over which surfaces mix, in scene units (methods blurred and "
+               "blurred-published)",
+               1e-15L, 1e15L}
+            .or_zero("none; of blurred-published a sixteenth of the scene's diagonal, its least"));
+}
+
 void visit_options(Like<RenderOptions> auto& o, auto&& visit) {
   visit(o.method, method_option(Task::kImage));
   visit(o.what, choice("what", kRenderWhat,
@@ -94,6 +108,7 @@ void visit_options(Like<RenderOptions> auto& o, auto&& visit) {
   visit(o.generator, kGeneratorOption);
   visit(o.exact_film, kFilmOption);
   visit(o.points, kPointsOption);
+  visit_options(o.blur, visit);
 }
 
 void visit_options(Like<GradientOptions> auto& o, auto&& visit) {
@@ -101,6 +116,7 @@ void visit_options(Like<GradientOptions> auto& o, auto&& visit) {
   visit(o.terms, terms_option(Task::kGradient));
   visit(o.step, step_option("Step of finite differences (method fd), in the parameter's unit"));
   visit_options(o.warp, visit);
+  visit_options(o.blur, visit);
   visit(o.exact_film, kFilmOption);
   visit(o.points, kPointsOption);
 }
@@ -114,6 +130,7 @@ void visit_options(Like<CheckOptions> auto& o, auto&& visit) {
             .or_zero("an eighth of the longer side, at least 4")
             .samples());
   visit_options(o.warp, visit);
+  visit_options(o.blur, visit);
   visit(o.exact_film, kFilmOption);
   visit(o.points, kPointsOption);
 }

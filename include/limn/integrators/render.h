@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "limn/core/blur.h"
 #include "limn/core/scene.h"
 #include "limn/integrators/film_points.h"
 #include "limn/integrators/method.h"
@@ -61,6 +62,7 @@ struct RenderOptions {
   // the same, errors of neighbours depend on each other. Methods that look around take no notice of
   // it: all their numbers are even, with the same variances.
   std::string generator = "independent";
+  Blur blur = {};  // of methods that blur; 0: see resolved()
 };
 
 RenderResult render(const Scene& scene, const RunSettings& settings,

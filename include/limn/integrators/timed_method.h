@@ -60,6 +60,7 @@ struct MethodInput {
   // Of the methods that draw edges on the film, see GradientOptions; others, and references, take
   // rays.
   bool exact_film = false;
+  Blur blur = {};  // of methods that blur
 
   GradientOptions options(const Method& method) const;
 };

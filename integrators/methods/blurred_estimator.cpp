@@ -1,0 +1,94 @@
+// Images of blurred faces, see blurred_path.h.
+#include "integrators/methods/blurred_estimator.h"
+
+#include <fmt/format.h>
+
+#include "integrators/paths/blurred_path.h"
+#include "integrators/paths/camera_path.h"
+#include "integrators/paths/path_log.h"
+
+namespace limn {
+namespace {
+
+std::shared_ptr<const Scene> seeded(const Scene& scene, std::span<const Parameter> parameters) {
+  if (parameters.empty()) return {std::shared_ptr<const Scene>(), &scene};
+  auto copy = std::make_shared<Scene>(deep_copy(scene));
+  for (size_t k = 0; k < parameters.size(); ++k) {
+    parameters[k].seed(*copy, static_cast<int>(k));
+  }
+  return copy;
+}
+
+}  // namespace
+
+BlurredEstimator::BlurredEstimator(const Scene& scene, const Blur& blur,
+                                   std::span<const Parameter> parameters, int threads,
+                                   Numbers numbers)
+    : scene_((check_blurred(scene), seeded(scene, parameters))),
+      lanes_(static_cast<int>(parameters.size())),
+      blurred_(*scene_, blur, threads),
+      filter_(scene_->film.filter),
+      numbers_(numbers) {
+  for (int k = 0; k < lanes_; ++k) lane_scale_[k] = parameters[k].natural_step;
+}
+
+BlurredEstimator::BlurredEstimator(const Scene& moved, const BlurredScene& unmoved, int threads,
+                                   Numbers numbers)
+    : scene_(std::shared_ptr<const Scene>(), &moved),
+      blurred_(moved, unmoved.blur(), threads, &unmoved),
+      filter_(scene_->film.filter),
+      numbers_(numbers) {}
+
+template <class S>
+void BlurredEstimator::add(const KeyedSample& sample, const CameraView<S>& view,
+                           SampleSink& sink) const {
+  const PixelSample& at = sample.at;
+  const FilmPosition place = sample_pixel_filter(scene_->film, filter_, at.x, at.y, sample.key);
+  const CameraRay<S> camera = sample_ray(view, place, sample.key);
+  if (sink.log()) {
+    log_camera_ray(*sink.log(), place.x, place.y, value(camera.origin), value(camera.direction));
+  }
+  RayCount rays;
+  BlurredPath<S> path(blurred_, sample.key, lane_scale_, rays);
+  Rgb<S> radiance;
+  bool traced = true;
+  try {
+    radiance = path.arriving({camera.origin, camera.direction, camera.t_min, camera.t_max});
+  } catch (const UntraceableRay&) {
+    traced = false;
+  }
+  sink.cost(0).add(rays);
+  ++sink.cost(0).samples;
+  if (!traced || !is_finite(value(radiance))) return sink.reject(at, slot_name(0));
+  if constexpr (std::is_same_v<S, Dual>) {
+    const Rgb<Lanes> derivative{radiance.r.d, radiance.g.d, radiance.b.d};
+    if (!is_finite(derivative)) return sink.reject(at, slot_name(0));
+    sink.add(0, at, derivative, 1);
+  }
+  sink.add_radiance(at, value(radiance), 1);
+}
+
+void BlurredEstimator::add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const {
+  if (lanes_ > 0) {
+    const CameraView<Dual> view(scene_->camera);
+    for (const KeyedSample& sample : samples) add(sample, view, sink);
+  } else {
+    const CameraView<double> view(scene_->camera);
+    for (const KeyedSample& sample : samples) add(sample, view, sink);
+  }
+}
+
+std::string bias_of_blur(const Scene& scene, const Blur& blur) {
+  std::string text = fmt::format(
+      "faces fade over {:.3g} scene units (sigma {:.3g}): images and derivatives are those of the "
+      "blurred scene, biased for the sharp one",
+      std::sqrt(blur.sigma), blur.sigma);
+  const double side = median_side(scene);
+  if (blur.reach() > side) {
+    text += fmt::format("; faces extend by {:.3g}, more than the median of their sides, {:.3g}",
+                        blur.reach(), side);
+  }
+  return text;
+}
+
+}  // namespace limn

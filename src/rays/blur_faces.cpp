@@ -1,0 +1,185 @@
+// Blurred faces: their neighbours, what rays meet of them, and how far they extend.
+#include <algorithm>
+#include <cmath>
+#include <unordered_set>
+
+#include "limn/core/blur_tracer.h"
+#include "limn/core/error.h"
+#include "limn/core/touch.h"
+
+namespace limn {
+namespace {
+
+double most_exponent() { return std::log((1 - kLeastOpacity) / kLeastOpacity); }
+
+// Every side has one other face, which has it the other way round.
+bool is_closed(const Mesh& mesh) {
+  std::unordered_set<uint64_t> sides;
+  const auto side = [&](uint32_t a, uint32_t b) {
+    return static_cast<uint64_t>(mesh.weld[a]) << 32 | mesh.weld[b];
+  };
+  for (const FaceIndices& f : mesh.faces) {
+    for (int k = 0; k < 3; ++k) {
+      if (!sides.insert(side(f[k], f[(k + 1) % 3])).second) return false;
+    }
+  }
+  return std::ranges::all_of(mesh.faces, [&](const FaceIndices& f) {
+    return sides.contains(side(f[1], f[0])) && sides.contains(side(f[2], f[1])) &&
+           sides.contains(side(f[0], f[2]));
+  });
+}
+
+bool before(const BlurHit& a, const BlurHit& b) {
+  if (a.t != b.t) return a.t < b.t;
+  if (a.face.shape != b.face.shape) return a.face.shape < b.face.shape;
+  return a.face.face < b.face.face;
+}
+
+}  // namespace
+
+double Blur::reach() const { return std::sqrt(sigma * most_exponent()); }
+double Blur::depth() const { return gamma * most_exponent(); }
+
+BlurFaces::BlurFaces(const Scene& scene, const Blur& blur)
+    : scene_(scene), blur_(blur), reach_(blur.reach()), meshes_(scene.shapes.size()) {
+  for (size_t s = 0; s < meshes_.size(); ++s) {
+    const Shape& shape = scene.shapes[s];
+    const Mesh& mesh = shape.mesh;
+    MeshFaces& own = meshes_[s];
+    own.front_only = !shape.bsdf->side(false) && is_closed(mesh);
+    own.first.assign(mesh.positions.size() + 1, 0);
+    for (const FaceIndices& f : mesh.faces) {
+      for (const uint32_t v : f) ++own.first[mesh.weld[v] + 1];
+    }
+    for (size_t v = 0; v < mesh.positions.size(); ++v) own.first[v + 1] += own.first[v];
+    own.around.resize(3 * mesh.faces.size());
+    std::vector<uint32_t> next = own.first;
+    for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
+      for (const uint32_t v : mesh.faces[f]) own.around[next[mesh.weld[v]]++] = f;
+    }
+  }
+}
+
+bool BlurFaces::touch(FaceRef a, FaceRef b) const {
+  if (a.shape != b.shape) return false;
+  const Mesh& mesh = scene_.shape(a.shape).mesh;
+  for (const uint32_t v : mesh.face(a.face)) {
+    for (const uint32_t w : mesh.face(b.face)) {
+      if (mesh.weld[v] == mesh.weld[w]) return true;
+    }
+  }
+  return false;
+}
+
+bool BlurFaces::is_beside_start(const Ray& ray, FaceRef face,
+                                const std::array<Vec3d, 3>& corners) const {
+  if (!ray.start.shape.valid()) return false;
+  if (face == ray.start) return true;
+  const auto a = face_corners<double>(scene_.shape(ray.start.shape).mesh, ray.start.face);
+  Vec3d n = normalize(cross(a[1] - a[0], a[2] - a[0]));
+  if (dot(n, ray.direction) < 0) n = -n;
+  const double tolerance = touch_tolerance(largest_coordinate(a), largest_coordinate(corners));
+  double least = 0, most = 0;
+  for (const Vec3d& x : corners) {
+    least = std::min(least, dot(n, x - a[0]));
+    most = std::max(most, dot(n, x - a[0]));
+  }
+  if (most > tolerance) return false;
+  return least >= -tolerance || touch(face, ray.start);
+}
+
+std::optional<BlurHit> BlurFaces::meet(const Ray& ray, FaceRef face) const {
+  const Shape& shape = scene_.shape(face.shape);
+  if (ray.skip_emitters && shape.is_emitter) return {};
+  const auto corners = face_corners<double>(shape.mesh, face.face);
+  const Vec3d n = cross(corners[1] - corners[0], corners[2] - corners[0]);
+  const double facing = dot(n, ray.direction);
+  if (facing == 0 || (facing > 0 && meshes_[face.shape.index()].front_only)) return {};
+  const double t = dot(n, corners[0] - ray.origin) / facing;
+  if (!(t > ray.t_min) || !(t < ray.t_max)) return {};
+  const double distance = distance_to_sides(corners, ray.origin + ray.direction * t);
+  if (!(distance > -reach_) || is_beside_start(ray, face, corners)) return {};
+  const double opacity = blur_opacity(distance, blur_.sigma);
+  if (!(opacity > 0)) return {};
+  return BlurHit{face, t, opacity, facing < 0};
+}
+
+void BlurFaces::settle(const Ray& ray, std::vector<BlurHit>& hits) const {
+  const auto bring_in_order = [&] {
+    std::sort(hits.begin(), hits.end(), before);
+    const auto same = [](const BlurHit& a, const BlurHit& b) { return a.face == b.face; };
+    hits.erase(std::unique(hits.begin(), hits.end(), same), hits.end());
+  };
+  bring_in_order();
+  const auto opaque = std::ranges::find_if(hits, [](const BlurHit& h) { return h.opacity == 1; });
+  if (opaque == hits.end()) return;
+  const FaceRef face = opaque->face;
+  const double last = opaque->t + blur_.depth();
+  std::erase_if(hits, [&](const BlurHit& hit) { return hit.t > last; });
+  const Mesh& mesh = scene_.shape(face.shape).mesh;
+  const MeshFaces& own = meshes_[face.shape.index()];
+  const size_t count = hits.size();
+  for (const uint32_t v : mesh.face(face.face)) {
+    for (uint32_t i = own.first[mesh.weld[v]]; i < own.first[mesh.weld[v] + 1]; ++i) {
+      const FaceRef other{face.shape, FaceId(own.around[i])};
+      if (other == face || !has_area(mesh, mesh.face(other.face))) continue;
+      const auto hit = meet(ray, other);
+      if (hit && hit->t > last) hits.push_back(*hit);
+    }
+  }
+  if (hits.size() > count) bring_in_order();
+}
+
+std::vector<Vec3d> enlarged_face(const std::array<Vec3d, 3>& corners, double reach) {
+  constexpr double kMostMitre = 3;
+  const Vec3d n = normalize(cross(corners[1] - corners[0], corners[2] - corners[0]));
+  std::vector<Vec3d> polygon;
+  for (int k = 0; k < 3; ++k) {
+    const Vec3d& c = corners[k];
+    const Vec3d in = normalize(c - corners[(k + 2) % 3]), out = normalize(corners[(k + 1) % 3] - c);
+    const Vec3d m_in = cross(in, n), m_out = cross(out, n);  // away from the face
+    const double twice = 1 + dot(m_in, m_out);               // 2 / mitre squared
+    if (twice * kMostMitre * kMostMitre >= 2) {
+      polygon.push_back(c + (m_in + m_out) * (reach / twice));
+      continue;
+    }
+    const Vec3d middle = normalize(in - out);
+    const auto cut = [&](const Vec3d& m, const Vec3d& along) {
+      return c + (m + along * ((kMostMitre - dot(m, middle)) / dot(along, middle))) * reach;
+    };
+    polygon.push_back(cut(m_in, in));
+    polygon.push_back(cut(m_out, -out));
+  }
+  return polygon;
+}
+
+double median_side(const Scene& scene) {
+  std::vector<double> sides;
+  for (const Shape& shape : scene.shapes) {
+    for (uint32_t f = 0; f < shape.mesh.faces.size(); ++f) {
+      const auto c = face_corners<double>(shape.mesh, FaceId(f));
+      for (int k = 0; k < 3; ++k) sides.push_back(length(c[(k + 1) % 3] - c[k]));
+    }
+  }
+  if (sides.empty()) return 0;
+  const auto middle = sides.begin() + static_cast<std::ptrdiff_t>(sides.size() / 2);
+  std::nth_element(sides.begin(), middle, sides.end());
+  return *middle;
+}
+
+Blur resolved(Blur blur, const Scene& scene) {
+  constexpr double kShare = 1.0 / 16;  // faces then extend by a quarter of their sides; not tuned
+  if (blur.sigma == 0) blur.sigma = std::pow(kShare * median_side(scene), 2);
+  if (!(blur.sigma > 0)) throw InputError(scene.file + ": has no faces that could be blurred");
+  if (blur.weights != BlurWeights::kPublished) return blur;
+  const double least = bounds_of(scene).diagonal() / 16;
+  if (blur.gamma == 0) blur.gamma = least;
+  if (blur.gamma < least) {
+    throw InputError(
+        "gamma: blurred-published needs a sixteenth of the scene's diagonal or more, " +
+        std::to_string(least));
+  }
+  return blur;
+}
+
+}  // namespace limn
