@@ -47,15 +47,15 @@ bool FilmPointAdjoint::at(const FilmPlace& place) {
 
 bool FilmPointAdjoint::takes(const BoundaryForm& form, const Rng&) {
   form_ = &form;
-  return motion_.moves(form) || motion_.slots().camera != 0;
+  return motion_.moves(form) || motion_.slots().camera != 0 || film_moves();
 }
 
 void FilmPointAdjoint::add(const Rgb<double>& amount) {
   added_ = true;
   const double weight = weighed(adjoint_, amount) * form_->scale * share_;
   motion_.contribute(tape_, seeds_, *form_, weight);
-  if (motion_.slots().camera == 0 && form_->by.count == 0) return;
-  auto ray = ray_at(camera_leaves(motion_.scene().camera), place_);
+  if (motion_.slots().camera == 0 && form_->by.count == 0 && !film_moves()) return;
+  auto ray = moving_ray(motion_.scene(), field_, place_);
   double distance = form_->distance;
   if (form_->by.through) {
     refract_ray(motion_.scene(), form_->by, ray.origin, ray.direction);
@@ -136,6 +136,10 @@ void FilmPointAdjoint::add_clip(const FilmLineSample& line, double weight) {
   const auto position = view.project(clip_point(motion_.scene(), view, *line.clip, line.t));
   seeds_.add(position.x.node, weight * line.nx);
   seeds_.add(position.y.node, weight * line.ny);
+  if (!film_moves()) return;
+  const auto film = field_->moving(place_);
+  seeds_.add(film.x.node, -weight * line.nx);
+  seeds_.add(film.y.node, -weight * line.ny);
 }
 
 }  // namespace limn

@@ -4,6 +4,7 @@
 
 #include "integrators/backward/edge_motion.h"
 #include "integrators/backward/film_adjoint.h"
+#include "integrators/backward/film_field.h"
 #include "integrators/terms/boundary_sample.h"
 #include "limn/core/var.h"
 
@@ -34,11 +35,12 @@ class VertexAdjoint final : public BoundarySink {
 };
 
 // One sample of the film. share: of the batch's samples, one over their number for each pixel and
-// path.
+// path. field: by which positions move; null: they are held.
 class FilmPointAdjoint final : public FilmSink {
  public:
-  FilmPointAdjoint(const EdgeMotion& motion, const FilmAdjoint& film, double share, Tape& tape)
-      : motion_(motion), film_(film), share_(share), tape_(tape) {
+  FilmPointAdjoint(const EdgeMotion& motion, const FilmAdjoint& film, const FilmField* field,
+                   double share, Tape& tape)
+      : motion_(motion), film_(film), field_(field), share_(share), tape_(tape) {
     book_on(own_);
   }
   // Whether its pixels have an adjoint, and whether it added something.
@@ -54,9 +56,11 @@ class FilmPointAdjoint final : public FilmSink {
 
  private:
   void add_clip(const FilmLineSample& line, double weight);
+  bool film_moves() const { return field_ && field_->moves(place_); }
 
   const EdgeMotion& motion_;
   const FilmAdjoint& film_;
+  const FilmField* field_;
   double share_;
   Tape& tape_;
   Seeds seeds_;

@@ -39,6 +39,9 @@ class ParameterSlots {
   // By which magnitudes of different slots compare: the scene's size for a length, else 1.
   double unit(uint32_t slot) const { return units_[slot]; }
 
+  // More slots, from the one returned on, that no parameter has.
+  uint32_t take(uint32_t count, double unit = 1);
+
   // sums: by slot. The derivatives of each parameter's numbers.
   std::vector<std::vector<double>> gather(const std::vector<double>& sums) const;
 
@@ -70,7 +73,6 @@ class ParameterSlots {
   };
   class Values;
 
-  uint32_t take(uint32_t count, double unit = 1);
   std::vector<Vec3d> velocities_now(const Scene& scene, const Parameter& parameter,
                                     uint32_t shape) const;
   void add_shapes(const Scene& scene);

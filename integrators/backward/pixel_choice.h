@@ -27,6 +27,8 @@ class PixelChoice {
   // Of a batch: its samples of every pixel, or as many paths spread over the pixels.
   size_t paths(const Batch& batch) const { return choice_.size() * batch.count(); }
   PixelPath path(const Batch& batch, size_t index) const;
+  // Of a path to be of this pixel.
+  double probability(size_t pixel) const { return choice_.probability(pixel); }
   // The sample per pixel that the path of this number belongs to, and the index in its batch of
   // that path of a pixel.
   int64_t sample_of(int64_t number) const {

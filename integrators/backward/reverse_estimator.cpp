@@ -17,6 +17,7 @@
 #include "integrators/paths/path_follow.h"
 #include "integrators/paths/path_log.h"
 #include "limn/core/error.h"
+#include "limn/core/exposure.h"
 #include "limn/integrators/options.h"
 
 namespace limn {
@@ -31,11 +32,19 @@ ReverseEstimator::ReverseEstimator(const Scene& scene, const Image& adjoint,
       method_(*options.method->reverse),
       moved_(moved_in(scene, parameters_.parameters())),
       traced_(parameters_.scene(), threads, {.closed = method_.closed, .edges = moved_.any()}),
+      field_(may_move_film() && !time
+                 ? FilmField::make(traced_.context(), options.least_detail, parameters_, threads)
+                 : nullptr),
+      free_(parameters_.free()),
       input_(traced_.context(), 3, {1, 1, 1, 1}, method_.sampler, threads),
       filter_(scene.film.filter),
       motion_(parameters_.slots(), moved_.any() ? &input_.edges() : nullptr),
-      types_(terms_of(parameters_.scene(), method_.sampler, method_.closed)) {
-  input_.free = &parameters_.free();
+      types_(terms_of(parameters_.scene(), method_.sampler, method_.closed, field_ != nullptr)) {
+  if (field_) {  // positions that move are a camera that does
+    filtered_ = std::make_unique<FilterAdjoint>(parameters_.scene().film, film_, choice_, *field_);
+    moved_.camera = free_.camera = true;
+  }
+  input_.free = &free_;
   std::vector<std::string> names;
   for (const TermType* type : types_) names.emplace_back(type->name);
   const auto chosen = selected_terms(names, options.terms, scene.file);
@@ -53,12 +62,21 @@ ReverseEstimator::ReverseEstimator(const Scene& scene, const Image& adjoint,
   }
 }
 
+// Where all terms are sampled, of which all change with it.
+bool ReverseEstimator::may_move_film() const {
+  return (moved_.vertices || moved_.camera) && options_.least_detail <= 1 &&
+         options_.terms.empty() && !options_.uniform_pixels && !method_.closed &&
+         scene().camera.is_pinhole() && scene().shading != ShadingModel::kMitsuba &&
+         !needs_times(scene(), parameters_.parameters());
+}
+
 double ReverseEstimator::camera_samples() const {
   if (options_.camera_samples > 0) return options_.camera_samples;
   return method_.closed ? 1 : 0.25;  // where nothing else is noisy, these points are what is
 }
 
 double ReverseEstimator::samples_of(size_t slot) const {
+  if (is_filter(slot)) return film_samples(slot);
   if (film_samples(slot) > 0 || types_[slot]->on_film_alone()) return film_points(slot);
   return slot == pixel_slot_ ? 1 : options_.edge_samples;
 }
@@ -142,10 +160,12 @@ class ReverseEstimator::VertexAdjoints {
   Seeds seeds_;
 };
 
-// Moves with the camera where that has slots.
-CameraRay<Var> ReverseEstimator::moving_ray(const FilmPlace& film,
-                                            const CameraRay<double>& ray) const {
-  if (parameters_.slots().camera != 0) return ray_at(camera_leaves(scene().camera), film);
+// Moves with the camera where that has slots, and with positions on the film.
+CameraRay<Var> ReverseEstimator::ray_through(const FilmPlace& film,
+                                             const CameraRay<double>& ray) const {
+  if (parameters_.slots().camera != 0 || (field_ && field_->moves(film))) {
+    return moving_ray(scene(), field_.get(), film);
+  }
   const Vec3d &o = ray.origin, &d = ray.direction;
   return {{o.x, o.y, o.z}, {d.x, d.y, d.z}, ray.t_min, ray.t_max};
 }
@@ -156,13 +176,14 @@ ReverseEstimator::Path ReverseEstimator::path(const Batch& batch, size_t index) 
   return {{film.crop_x + static_cast<int>(path.pixel % film.crop_width),
            film.crop_y + static_cast<int>(path.pixel / film.crop_width),
            static_cast<int64_t>(path.sample)},
-          path.expected};
+          path.expected,
+          static_cast<double>(choice_.paths(batch))};
 }
 
 bool ReverseEstimator::trace(const Path& path, const Rng& key, Tape& tape, GradientTile& to) const {
   const PixelSample& at = path.at;
   const Rgb<double> adjoint = film_.of_pixel(at.x, at.y) * (1 / path.expected);
-  if (is_black(adjoint)) return true;
+  if (is_black(adjoint) && !(field_ && filtered_->needs_all())) return true;
   TermCost& cost = to.costs[pixel_slot_];
   VertexAdjoints vertices(*this, adjoint, tape, to);
   // As in forward mode: in closed form a path takes two places of its pixel.
@@ -173,7 +194,7 @@ bool ReverseEstimator::trace(const Path& path, const Rng& key, Tape& tape, Gradi
     const FilmPlace place{film, sample_lens(scene().camera, key)};
     const auto still = ray_at(CameraView<double>(scene().camera), place);
     if (to.log) log_camera_ray(*to.log, film.x, film.y, still.origin, still.direction);
-    const auto ray = moving_ray(place, still);
+    const auto ray = ray_through(place, still);
     RayCount rays;
     ++cost.samples;
     PathTracer<Var, VertexAdjoints> tracer(traced_.context(), rays);
@@ -185,6 +206,7 @@ bool ReverseEstimator::trace(const Path& path, const Rng& key, Tape& tape, Gradi
     if (terms_[pixel_slot_]) {
       for (int c = 0; c < 3; ++c) vertices.seeds().add(radiance[c].node, adjoint[c] / places);
     }
+    if (field_) filtered_->add_path(at, path.paths, film, value(radiance), tape);
     cost.add(rays);
   }
   if (!vertices.seeds().empty()) vertices.seeds().sweep(tape);
@@ -223,11 +245,32 @@ void ReverseEstimator::add_sample(const Batch& batch, const PixelSample& at,
   add_path(one, batch.seed, tape, to);
 }
 
-bool ReverseEstimator::trace(size_t slot, const FilmDraw& draw, Tape& tape,
-                             GradientTile& to) const {
+// A point of a line across which the adjoint jumps.
+bool ReverseEstimator::trace_line(size_t slot, const FilmDraw& draw, Tape& tape,
+                                  GradientTile& to) const {
   TermCost& cost = to.costs[slot];
   ++cost.samples;
-  FilmPointAdjoint point(motion_, film_, draw.share, tape);
+  const FilterAdjoint::LinePoint point = filtered_->line_point(draw.u);
+  const auto ray = CameraView<double>(scene().camera).ray<double>(point.at.x, point.at.y);
+  RayCount rays;
+  PathTracer<double, NoVisitor> tracer(traced_.context(), rays);
+  Walk<double, NoVisitor> walk(draw.key, 0, nullptr);
+  const StartRay<double> start{camera_ray(scene(), ray), ray.origin, ray.direction};
+  tracer.follow_rays({&start, 1}, {&walk, 1});
+  cost.add(rays);
+  if (walk.failed || !is_finite(walk.sums.radiance)) return false;
+  const double weight = weighed(point.jump, walk.sums.radiance) * draw.share;
+  for (int k = 0; k < 2; ++k) tape.contribute(point.slots[k], weight * point.weights[k]);
+  ++cost.counted;
+  return true;
+}
+
+bool ReverseEstimator::trace(size_t slot, const FilmDraw& draw, Tape& tape,
+                             GradientTile& to) const {
+  if (is_filter(slot)) return trace_line(slot, draw, tape, to);
+  TermCost& cost = to.costs[slot];
+  ++cost.samples;
+  FilmPointAdjoint point(motion_, film_, field_.get(), draw.share, tape);
   try {
     terms_[slot]->sample_film(draw.u, draw.key, point);
   } catch (const UntraceableRay&) {

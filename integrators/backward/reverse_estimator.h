@@ -5,6 +5,8 @@
 
 #include "integrators/backward/edge_motion.h"
 #include "integrators/backward/film_adjoint.h"
+#include "integrators/backward/film_field.h"
+#include "integrators/backward/filter_adjoint.h"
 #include "integrators/backward/parameter_slots.h"
 #include "integrators/backward/pixel_choice.h"
 #include "integrators/estimates/gradient_estimator.h"
@@ -34,7 +36,10 @@ class ReverseEstimator final : public GradientEstimator {
   const char* slot_name(size_t slot) const override { return types_[slot]->name; }
   uint32_t gradient_slots() const override { return parameters_.slots().count; }
   std::vector<std::vector<double>> gather(const std::vector<double>& sums) const override {
-    return parameters_.gather(sums);
+    if (!field_) return parameters_.gather(sums);
+    std::vector<double> all = sums;
+    field_->gather(all);
+    return parameters_.gather(all);
   }
   std::vector<size_t> sizes() const override { return parameters_.sizes(); }
   int most_batches() const override { return std::max(1, options_.batches); }
@@ -48,6 +53,7 @@ class ReverseEstimator final : public GradientEstimator {
   void add_sample(const Batch& batch, const PixelSample& at, GradientTile& to) const override;
 
   double film_samples(size_t slot) const override {
+    if (is_filter(slot)) return terms_[slot] ? filtered_->line_samples() : 0;
     return terms_[slot] && terms_[slot]->uses_film() ? film_points(slot) : 0;
   }
   int film_stream(size_t slot) const override { return types_[slot]->film_stream; }
@@ -62,17 +68,21 @@ class ReverseEstimator final : public GradientEstimator {
   double film_points(size_t slot) const {
     return types_[slot]->on_film_alone() ? camera_samples() : options_.shadow_samples;
   }
-  CameraRay<Var> moving_ray(const FilmPlace& film, const CameraRay<double>& ray) const;
+  bool is_filter(size_t slot) const { return types_[slot]->moved_film; }
+  bool may_move_film() const;
+  CameraRay<Var> ray_through(const FilmPlace& film, const CameraRay<double>& ray) const;
   // The path of a pixel. expected: how many paths it has in the batch, on average.
   struct Path {
     PixelSample at;
     double expected;
+    double paths;  // of all pixels in the batch
   };
   Path path(const Batch& batch, size_t index) const;
   void add_path(const Path& path, uint64_t seed, Tape& tape, GradientTile& to) const;
   // Leaves on the tape what a sample contributes; false if it is not finite.
   bool trace(const Path& path, const Rng& key, Tape& tape, GradientTile& to) const;
   bool trace(size_t slot, const FilmDraw& draw, Tape& tape, GradientTile& to) const;
+  bool trace_line(size_t slot, const FilmDraw& draw, Tape& tape, GradientTile& to) const;
 
   const BackwardOptions& options_;
   FilmAdjoint film_;
@@ -81,6 +91,9 @@ class ReverseEstimator final : public GradientEstimator {
   ReverseMethod method_;
   Moved moved_;  // by the parameters
   TracedScene traced_;
+  std::unique_ptr<FilmField> field_;         // null where positions on the film are held
+  std::unique_ptr<FilterAdjoint> filtered_;  // with it
+  FreeMotion free_;
   TermInput input_;
   FilterTable filter_;
   EdgeMotion motion_;

@@ -81,6 +81,7 @@ inline constexpr TermType kTermTypes[] = {
      .make = make_filter_term,
      .applies = always,
      .changes = by_motion_in_view,
+     .film_stream = 3,
      .moved_film = true},
 };
 

@@ -38,6 +38,9 @@ struct BackwardOptions {
   // With "analytic" and faces there is one term, `faces`, and no numbers of samples, no batches and
   // no standard errors but 0; InputError for faces with another method, and in parts.
   FilmPoints points = FilmPoints::kRandom;
+  // Positions on the film follow what they see (README.md of integrators/backward) where at least
+  // this share of pairs of rays of a pixel meets surfaces apart; above 1: nowhere. Not tuned.
+  double least_detail = 0.5;
   int edge_samples = 1;  // at every vertex of a path, of each term of edges; 65536 at most
   // Points on the film, per path, of `camera`; 65536 at most. 0: a quarter, and with "analytic" one
   // (README.md of integrators/backward has what other numbers did).
