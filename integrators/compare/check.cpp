@@ -483,7 +483,7 @@ class Checker {
   int round_ = 0;
   double natural_step_ = 0, last_step_ = 0;
   double most_ = std::numeric_limits<double>::infinity();  // of steps
-  std::optional<Blur> blur_;  // none: images are sharp
+  std::optional<Blur> blur_;                               // none: images are sharp
 };
 
 }  // namespace

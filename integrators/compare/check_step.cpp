@@ -176,8 +176,7 @@ Found choose_step(const std::vector<DifferenceEstimate>& estimates,
 }  // namespace
 
 double find_check_step(const Scene& scene, const std::string& parameter, const Windows& windows,
-                       double most, const RunSettings& settings,
-                       const std::optional<Blur>& blur) {
+                       double most, const RunSettings& settings, const std::optional<Blur>& blur) {
   RunSettings pilot = settings;
   pilot.progress = nullptr;
   pilot.spp = std::max(kPilotSamples, settings.spp / kPilotPart);

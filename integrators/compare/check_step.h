@@ -16,8 +16,7 @@ namespace limn {
 // mean over the windows, and of the whole image. From a pilot with a seed of its own. A power of
 // two: moved positions are exact where floats allow it. blur: see central_differences().
 double find_check_step(const Scene& scene, const std::string& parameter, const Windows& windows,
-                       double most, const RunSettings& settings,
-                       const std::optional<Blur>& blur);
+                       double most, const RunSettings& settings, const std::optional<Blur>& blur);
 
 // The same judged by the run itself, which sees more than the pilot: the step if the run's bias is
 // small enough, else a smaller one.
