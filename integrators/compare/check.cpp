@@ -87,8 +87,8 @@ void judge(ProbeScores& places) {
     place.limit = limits[i < windows ? 0 : 1];
     const double one = normal_p_value(place.score.z);
     const double n = static_cast<double>(i < windows ? windows : others);
-    const double p = std::min(1.0, -2 * std::expm1(n * std::log1p(-one)));
-    // A NaN must not pass for agreement.
+    // A NaN must not pass for agreement: min() returns it where it comes first.
+    const double p = std::min(-2 * std::expm1(n * std::log1p(-one)), 1.0);
     if (p >= places.p) continue;
     places.p = std::isnan(p) ? 0 : p;
     places.smallest = i;
@@ -296,8 +296,9 @@ class Checker {
   // Both runs of a round, or the differences with shorter steps alone. False if interrupted.
   bool take(Runs& runs) {
     const Stopwatch watch;
-    if (most_ > natural_step_) {
+    if (gradient_round_ != round_) {
       runs.gradient = run_(scene_, gradient_options(), settings_of(samples_.gradient, 0, 0));
+      gradient_round_ = round_;
     }
     runs.step = options_.step;
     if (runs.step <= 0) {
@@ -331,6 +332,8 @@ class Checker {
 
   CheckResult judged(const ProbeScores& places, Runs runs, CheckResult result) const {
     result.step = runs.step;
+    result.spp = runs.gradient.spp;
+    result.difference_spp = runs.differences.spp;
     std::vector<double> z;
     for (size_t k = 0; k < places.windows; ++k) z.push_back(-places.list[k].score.z);
     result.windows = summarize(z);
@@ -480,7 +483,7 @@ class Checker {
   Windows windows_;
   bool jumps_ = true;
   CheckSamples samples_;
-  int round_ = 0;
+  int round_ = 0, gradient_round_ = -1;
   double natural_step_ = 0, last_step_ = 0;
   double most_ = std::numeric_limits<double>::infinity();  // of steps
   std::optional<Blur> blur_;                               // none: images are sharp

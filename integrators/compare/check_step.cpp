@@ -173,6 +173,17 @@ Found choose_step(const std::vector<DifferenceEstimate>& estimates,
   return {std::max(step, steps[0] / kFactor), step < steps[0]};
 }
 
+// Differences take twice the step: neither may leave the parameter's range, where the natural one
+// does not.
+double largest_step(const Scene& scene, const Parameter& parameter) {
+  if (!moved_by({&parameter, 1}).any()) return parameter.natural_step;
+  double step = kMovedSteps * parameter.natural_step;
+  for (const double now : parameter.value(scene)) {
+    step = std::min({step, 0.5 * (now - parameter.least), 0.5 * (parameter.most - now)});
+  }
+  return std::max(step, parameter.natural_step);
+}
+
 }  // namespace
 
 double find_check_step(const Scene& scene, const std::string& parameter, const Windows& windows,
@@ -183,8 +194,7 @@ double find_check_step(const Scene& scene, const std::string& parameter, const W
   pilot.seed = settings.seed + 1;  // not the samples that the run will take
   const Parameter moved = find_parameter(scene, parameter);
   const double least = least_step(scene, moved);
-  const double beyond = moved_by({&moved, 1}).any() ? kMovedSteps : 1;
-  most = std::min(most, beyond * moved.natural_step);
+  most = std::min(most, largest_step(scene, moved));
   double step = most, largest = step;
   for (int ladder = 0; ladder < kLadders; ++ladder) {
     DifferenceJob job{parameter, {}, {}};

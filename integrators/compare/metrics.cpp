@@ -8,6 +8,9 @@
 namespace limn {
 namespace {
 
+// Of a block, over its sum: kept references are floats.
+constexpr double kRounding = 0x1p-23;
+
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 // Squared error of a pixel over its channels, and the reference's share of it.
@@ -104,9 +107,11 @@ std::vector<double> bias_scores(const std::vector<BlockSums>& repeats, const Blo
     if (theirs.value == 0) theirs.value = std::fabs(mean) * reference.event;
     const double both = ours.value + theirs.value;
     if (std::isnan(both)) return {};
-    if (both == 0 && residual == 0) continue;
+    const double rounding = kRounding * std::fabs(mean);
+    if (both <= squared(rounding / 8) && std::fabs(residual) <= rounding) continue;
     const double degrees = std::min(ours.degrees, theirs.degrees);
-    scores.push_back(normal_from_student(residual / std::sqrt(both), degrees));
+    scores.push_back(
+        normal_from_student(residual / std::sqrt(std::max(both, squared(rounding))), degrees));
   }
   return scores;
 }

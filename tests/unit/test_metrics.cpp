@@ -151,6 +151,17 @@ TEST(Bias, EqualBlocksWithoutVarianceSayNothing) {
   EXPECT_TRUE(bias_scores({exact, exact}, exact, {0.0, 0.0}).empty());
 }
 
+// Blocks that show nothing but a constant sky differ by rounding, and all alike.
+TEST(Bias, RoundingSaysNothing) {
+  const BlockSums reference{{1.0}, {1e-34}, 7, 0};
+  BlockSums repeat{{1 + 5e-8}, {1e-33}, 7, 0};
+  EXPECT_TRUE(bias_scores({repeat, repeat}, reference, {0.0}).empty());
+  repeat.sums = {1.001};
+  const auto z = bias_scores({repeat, repeat}, reference, {0.0});
+  ASSERT_EQ(z.size(), 1u);
+  EXPECT_GT(z[0], 5);
+}
+
 TEST(Slope, OfAPowerLaw) {
   std::vector<TimedError> runs;
   for (const double t : {0.5, 1.0, 2.0, 4.0}) runs.push_back({t, {3 / t, 0.3 / t}});

@@ -25,7 +25,7 @@ std::string two_digits(double value) {
 
 // What else to ask for where a run tells nothing.
 std::string advice(const CheckResult& r, double seconds) {
-  const auto spp = static_cast<double>(r.gradient.spp);
+  const auto spp = static_cast<double>(r.spp);
   const double more = std::max(r.needed_spp / spp, 1.1);
   if (seconds > 0 && more < 1e6) return "take about --time " + two_digits(more * seconds);
   if (seconds == 0 && more * spp < 1e9) return "take about --spp " + two_digits(more * spp);
@@ -91,8 +91,8 @@ void print_check(const std::string& name, const CheckResult& r, double seconds) 
   for (const TermRun& term : r.gradient.terms) {
     samples += fmt::format("{}{} {:.3g}", samples.empty() ? "" : ", ", term.name, term.samples);
   }
-  fmt::print("{}: {} samples per pixel", name, r.gradient.spp);
-  if (r.differences.spp != r.gradient.spp) fmt::print(" ({} of differences)", r.differences.spp);
+  fmt::print("{}: {} samples per pixel", name, r.spp);
+  if (r.difference_spp != r.spp) fmt::print(" ({} of differences)", r.difference_spp);
   fmt::print(", {} windows of {} pixels, step {:.3g}\n", r.windows.count, r.block, r.step);
   fmt::print("  samples per spp    {}\n", samples);
   fmt::print("  gradient           {:.6g} +- {:.2g} (sum over the image)\n", r.total.gradient,
@@ -126,8 +126,8 @@ json figures_json(const std::string& name, const std::string& film, const CheckR
                  {"method", r.gradient.method},
                  {"film", film},
                  {"step", r.step},
-                 {"spp", r.gradient.spp},
-                 {"difference_spp", r.differences.spp},
+                 {"spp", r.spp},
+                 {"difference_spp", r.difference_spp},
                  {"samples", samples},
                  {"verdict", verdict_name(r.verdict)},
                  {"level", kCheckLevel},

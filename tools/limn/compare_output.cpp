@@ -218,7 +218,7 @@ Table::Row row_of(const ComparedMethod& m) {
       s.bias.count > 0 ? fmt::format("{:.2g} ({:.2g})", p_value(s.bias), s.bias.largest) : "-";
   return {m.name,
           fmt::format("{:.3g}", s.seconds),
-          fmt::format("{:.2g}", s.setup_seconds),
+          s.setup_seconds > 0 ? fmt::format("{:.2g}", s.setup_seconds) : "-",
           fmt::format("{:.4g}", s.spp),
           s.rays > 0 ? fmt::format("{:.3g}", s.rays / 1e6) : "-",
           uncertain(s.mse),

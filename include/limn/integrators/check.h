@@ -78,6 +78,7 @@ struct CheckResult {
   Verdict verdict = Verdict::kCannotTell;
   bool interrupted = false;  // nothing below is complete
   double step = 0;
+  int64_t spp = 0, difference_spp = 0;  // of the first run
   int block = 0;
   // z = (gradient - differences) / combined error: of the windows, and of the whole image. Windows
   // are tents, `block` pixels apart, that add up to one: what moves over the border of two changes

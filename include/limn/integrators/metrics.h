@@ -45,8 +45,8 @@ struct BlockSums {
 // z-scores of the blocks: mean over the repeats minus the reference, over the standard error of
 // both. Student's t, turned into normal scores, with the fewer degrees of freedom of the two: a few
 // repeats that agree by chance must not pass for precise (as they would with the degrees of Welch
-// and Satterthwaite). Blocks without any variance that are equal are left out. Empty if no variance
-// is known: one repeat without variances of its own.
+// and Satterthwaite). Blocks without any variance that are equal, both but for the rounding of
+// floats, are left out. Empty if no variance is known: one repeat without variances of its own.
 // edges: magnitude of what edges add to each block of the reference, for the variance of events; a
 // reference without variance in a block has that of events that add the mean over the repeats.
 std::vector<double> bias_scores(const std::vector<BlockSums>& repeats, const BlockSums& reference,
