@@ -62,12 +62,14 @@ ReverseEstimator::ReverseEstimator(const Scene& scene, const Image& adjoint,
   }
 }
 
-// Where all terms are sampled, of which all change with it.
+// Where all terms are sampled, of which all change with it, and at every jump of radiance there is
+// an edge: of what smooth lobes show there may be none.
 bool ReverseEstimator::may_move_film() const {
   return (moved_.vertices || moved_.camera) && options_.least_detail <= 1 &&
          options_.terms.empty() && !options_.uniform_pixels && !method_.closed &&
          scene().camera.is_pinhole() && scene().shading != ShadingModel::kMitsuba &&
-         !needs_times(scene(), parameters_.parameters());
+         !needs_times(scene(), parameters_.parameters()) &&
+         find_chain_light(traced_.context(), 0).shapes.empty();
 }
 
 double ReverseEstimator::camera_samples() const {

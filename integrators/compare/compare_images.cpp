@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "limn/core/error.h"
+#include "limn/core/exposure.h"
 #include "limn/integrators/compare.h"
 #include "limn/integrators/methods.h"
 
@@ -20,12 +21,19 @@ class ImageRuns final : public TimedMethod {
       : scene_(scene), options_(std::move(options)), block_(block) {
     check_task(method, Task::kImage);
     options_.method = method;
-    if (looks_around()) options_.exact_film = false;
+    if (looks_around() || method->blurs) options_.exact_film = false;
+    if (!method->blurs) options_.blur = {};
   }
 
-  // Set-up, a pilot's with it, and one sample of one pixel.
+  // Set-up, a pilot's with it, and one sample of one pixel, or of each where something moves.
   void try_once(RunSettings settings) const {
     settings.progress = nullptr;
+    if (is_moving(scene_)) {  // traces of samples have no times
+      settings.spp = 1;
+      settings.seconds = 0;
+      render(scene_, settings, options_);
+      return;
+    }
     const NonFinite::SampleId corner{scene_.film.crop_x, scene_.film.crop_y, 0, ""};
     trace_sample(scene_, settings, corner, options_);
   }

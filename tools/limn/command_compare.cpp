@@ -50,10 +50,13 @@ std::vector<std::string> own_names(const std::vector<std::string>& names) {
 
 void check_methods_of_images(const CLI::App& app, const CompareArguments& command) {
   std::vector<Method> methods = parse_methods(command.methods, Task::kImage);
-  const auto takes_film = [](const Method& method) { return !method->image->looks_around; };
+  const auto takes_film = [](const Method& method) {
+    return !method->image->looks_around && !method->blurs;
+  };
   if (command.render.exact_film && std::ranges::none_of(methods, takes_film)) {
     throw InputError("--film exact: none of --methods takes it; path and analytic do");
   }
+  check_blur(command.render.blur, methods);
   methods.emplace_back("rays");  // makes the reference
   check_image_options(app, methods);
 }
