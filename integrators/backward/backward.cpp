@@ -8,6 +8,7 @@
 #include "integrators/backward/faces_gradient.h"
 #include "integrators/backward/parameter_slots.h"
 #include "integrators/backward/reverse_estimator.h"
+#include "integrators/backward/reverse_pilot.h"
 #include "integrators/estimates/batches.h"
 #include "integrators/methods/hair_gaps.h"
 #include "limn/core/exposure.h"
@@ -35,20 +36,22 @@ void identify(const ReverseEstimator& estimator, const Image& adjoint,
               const BackwardOptions& options, const std::vector<TermRun>& terms,
               BatchStore& store) {
   const std::vector<Parameter>& parameters = estimator.parameters().parameters();
-  std::vector<std::string> computed;
-  for (const TermRun& term : terms)
+  std::vector<std::string> computed, samples;
+  for (const TermRun& term : terms) {
     if (term.computed) computed.push_back(term.name);
+    samples.push_back(fmt::format("{} {}", term.name, term.samples));
+  }
   store.identify("method", "backward");
-  store.identify("sampling", options.method.name());
+  store.identify("sampling", estimator.method_name());
   store.identify("adjoint", fingerprint({adjoint.data.begin(), adjoint.data.end()}));
   store.identify("parameters", join(names_of(parameters)));
   store.identify("velocities", fingerprint(estimator.scene(), parameters));
   store.identify("terms", join(computed));
-  store.identify("samples",
-                 fmt::format("{} pixels, {} edges, {} on the film, {} of shadows, {} "
-                             "batches",
-                             options.uniform_pixels ? "uniform" : "adjoint", options.edge_samples,
-                             estimator.camera_samples(), options.shadow_samples, options.batches));
+  store.identify(
+      "samples",
+      fmt::format("{} pixels, {} edges, {} on film, {} of shadows, {}, {} batches",
+                  options.uniform_pixels ? "uniform" : "adjoint", options.edge_samples,
+                  options.camera_samples, options.shadow_samples, join(samples), options.batches));
 }
 
 // watch: runs since the job began.
@@ -112,13 +115,16 @@ BackwardResult backward(const Scene& scene, const Image& adjoint, const Backward
   check(options);
   const Stopwatch watch;
   const RunSettings settings = settings_for(options.points, asked);
-  const auto run_with = [&](auto estimator) {
-    return run(scene, std::move(estimator), adjoint, options, settings, watch);
-  };
   if (options.points == FilmPoints::kFaces) {
-    return run_with(std::make_unique<FacesGradient>(scene, adjoint, options, settings.threads));
+    auto faces = std::make_unique<FacesGradient>(scene, adjoint, options, settings.threads);
+    return run(scene, std::move(faces), adjoint, options, settings, watch);
   }
-  return run_with(std::make_unique<ReverseEstimator>(scene, adjoint, options, settings.threads));
+  ReversePlan plan = planned(scene, adjoint, options, settings, watch);
+  const BackwardOptions own = plan.estimator->options();
+  BackwardResult result = run(scene, std::move(plan.estimator), adjoint, own, settings, watch);
+  result.method = own.method.name();
+  result.decision = plan.decision;
+  return result;
 }
 
 std::vector<std::string> trace_backward(const Scene& scene, const Image& adjoint,
@@ -136,7 +142,8 @@ std::vector<std::string> trace_backward(const Scene& scene, const Image& adjoint
   if (options.points == FilmPoints::kFaces) {
     trace(FacesGradient(scene, adjoint, options, settings.threads));
   } else {
-    trace(ReverseEstimator(scene, adjoint, options, settings.threads));
+    const Stopwatch watch;
+    trace(*planned(scene, adjoint, options, settings, watch).estimator);
   }
   return log;
 }

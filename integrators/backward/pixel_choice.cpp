@@ -19,12 +19,11 @@ PixelChoice::PixelChoice(const std::vector<Rgb<double>>& adjoint, bool uniform)
   }
 }
 
-PixelPath PixelChoice::path(const Batch& batch, size_t index) const {
+PixelPath PixelChoice::path(const Batch& batch, size_t index, size_t all) const {
   if (uniform_) {
     return {index / batch.count(), batch.first + index % batch.count(),
             static_cast<double>(batch.count())};
   }
-  const size_t all = paths(batch);
   const uint64_t number = choice_.size() * static_cast<uint64_t>(batch.first) + index;
   Rng rng = Rng(batch.seed, UINT64_MAX, number).at(Purpose::kFilm, 0);
   const DiscreteDistribution::Draw draw = choice_.sample((index + rng.uniform()) / all);

@@ -1,5 +1,7 @@
 #pragma once
 // Which pixels the paths of a reverse pass go through.
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -25,8 +27,13 @@ class PixelChoice {
   PixelChoice(const std::vector<Rgb<double>>& adjoint, bool uniform);
 
   // Of a batch: its samples of every pixel, or as many paths spread over the pixels.
-  size_t paths(const Batch& batch) const { return choice_.size() * batch.count(); }
-  PixelPath path(const Batch& batch, size_t index) const;
+  // share: of these; uniform pixels have all.
+  size_t paths(const Batch& batch, double share = 1) const {
+    const size_t all = choice_.size() * batch.count();
+    return share == 1 ? all : std::max<size_t>(1, std::llround(share * static_cast<double>(all)));
+  }
+  // all: paths() of the batch.
+  PixelPath path(const Batch& batch, size_t index, size_t all) const;
   // Of a path to be of this pixel.
   double probability(size_t pixel) const { return choice_.probability(pixel); }
   // The sample per pixel that the path of this number belongs to, and the index in its batch of

@@ -72,15 +72,27 @@ bool ReverseEstimator::may_move_film() const {
          find_chain_light(traced_.context(), 0).shapes.empty();
 }
 
-double ReverseEstimator::camera_samples() const {
+double ReverseEstimator::film_points(size_t slot) const {
+  if (is_filter(slot)) return filtered_->line_samples();
+  if (!planned_.empty()) return planned_[slot];
+  if (!types_[slot]->on_film_alone()) return options_.shadow_samples;
   if (options_.camera_samples > 0) return options_.camera_samples;
   return method_.closed ? 1 : 0.25;  // where nothing else is noisy, these points are what is
 }
 
 double ReverseEstimator::samples_of(size_t slot) const {
-  if (is_filter(slot)) return film_samples(slot);
-  if (film_samples(slot) > 0 || types_[slot]->on_film_alone()) return film_points(slot);
-  return slot == pixel_slot_ ? 1 : options_.edge_samples;
+  const auto& term = terms_[slot];
+  const bool on_film = types_[slot]->on_film_alone() || is_filter(slot);
+  if (on_film || (term && term->uses_film())) return film_points(slot);
+  return slot == pixel_slot_ ? 1 : vertex_samples(slot);
+}
+
+std::vector<double> ReverseEstimator::possible_samples(size_t slot) const {
+  const auto& term = terms_[slot];
+  if (!term || slot == pixel_slot_ || is_filter(slot)) return {samples_of(slot)};
+  if (types_[slot]->on_film_alone()) return {0.25, 0.5, 1, 2, 4, 8, 16};
+  if (types_[slot]->regions) return {0.25, 0.5, 1, 2, 4, 8};
+  return {1, 2, 3, 4, 6, 8};
 }
 
 void ReverseEstimator::describe(BackwardResult& result) const {
@@ -116,10 +128,7 @@ class ReverseEstimator::VertexAdjoints {
  public:
   VertexAdjoints(const ReverseEstimator& estimator, const Rgb<double>& adjoint, Tape& tape,
                  GradientTile& to)
-      : estimator_(estimator),
-        adjoint_(adjoint * (1.0 / estimator.options_.edge_samples)),
-        tape_(tape),
-        to_(to) {}
+      : estimator_(estimator), adjoint_(adjoint), tape_(tape), to_(to) {}
 
   // The vertices of all that moves have unit tangents along the axes, and this one their opposites,
   // if it moves, so that an edge never seems to rest beside it.
@@ -144,13 +153,16 @@ class ReverseEstimator::VertexAdjoints {
         plain_vertex(surface, scattering, estimator_.scene().shading, bounces, step, key, below);
     vertex.throughput = value(throughput);
     if (!is_constant(surface.p)) vertex.velocity = {{-1, 0, 0, 0}, {0, -1, 0, 0}, {0, 0, -1, 0}};
-    VertexAdjoint sink(estimator_.motion_, adjoint_, surface.p, tape_, seeds_, to_.log);
     for (size_t slot = 0; slot < estimator_.slots(); ++slot) {
-      const Term* term = estimator_.terms_[slot].get();
-      if (!term || !term->uses_vertices()) continue;
+      if (!estimator_.adds(slot) || !estimator_.draws_at_vertices(slot)) continue;
+      const double count = estimator_.vertex_samples(slot);
+      // One decision for all vertices of a path.
+      if (count < 1 && key.at(Purpose::kTermRoulette, slot).uniform() >= count) continue;
       const Stopwatch watch;
+      const Rgb<double> adjoint = adjoint_ * (1 / count);
+      VertexAdjoint sink(estimator_.motion_, adjoint, surface.p, tape_, seeds_, to_.log);
       sink.book_on(to_.costs[slot]);
-      term->add_at_vertex(vertex, estimator_.options_.edge_samples, sink);
+      estimator_.terms_[slot]->add_at_vertex(vertex, std::max(1, static_cast<int>(count)), sink);
       to_.costs[slot].seconds += watch.seconds();
     }
   }
@@ -173,19 +185,24 @@ CameraRay<Var> ReverseEstimator::ray_through(const FilmPlace& film,
 }
 
 ReverseEstimator::Path ReverseEstimator::path(const Batch& batch, size_t index) const {
-  const PixelPath path = choice_.path(batch, index);
+  const PixelPath path = choice_.path(batch, index, samples(batch));
   const Film& film = scene().film;
-  return {{film.crop_x + static_cast<int>(path.pixel % film.crop_width),
-           film.crop_y + static_cast<int>(path.pixel / film.crop_width),
-           static_cast<int64_t>(path.sample)},
+  const int x = film.crop_x + static_cast<int>(path.pixel % film.crop_width);
+  const int y = film.crop_y + static_cast<int>(path.pixel / film.crop_width);
+  const auto pixel = static_cast<uint64_t>(y) * scene().camera.width + x;
+  return {{x, y, static_cast<int64_t>(path.sample)},
           path.expected,
-          static_cast<double>(choice_.paths(batch))};
+          static_cast<double>(samples(batch)),
+          // Of a sequence for each 2^32 paths.
+          is_even(*this) ? even_in_batch(batch, UINT64_MAX - 1 - (index >> 32), index)
+                         : Rng(batch.seed, pixel, path.sample)};
 }
 
-bool ReverseEstimator::trace(const Path& path, const Rng& key, Tape& tape, GradientTile& to) const {
-  const PixelSample& at = path.at;
-  const Rgb<double> adjoint = film_.of_pixel(at.x, at.y) * (1 / path.expected);
-  if (is_black(adjoint) && !(field_ && filtered_->needs_all())) return true;
+bool ReverseEstimator::trace(const Path& path, Tape& tape, GradientTile& to) const {
+  const auto& [at, expected, paths, key] = path;
+  const Rgb<double> adjoint = film_.of_pixel(at.x, at.y) * (1 / expected);
+  const bool filters = field_ && adds(pixel_slot_);
+  if (is_black(adjoint) && !(filters && filtered_->needs_all())) return true;
   TermCost& cost = to.costs[pixel_slot_];
   VertexAdjoints vertices(*this, adjoint, tape, to);
   // As in forward mode: in closed form a path takes two places of its pixel.
@@ -205,22 +222,20 @@ bool ReverseEstimator::trace(const Path& path, const Rng& key, Tape& tape, Gradi
     tracer.follow_rays({&start, 1}, {&walk, 1});
     const Rgb<Var>& radiance = walk.sums.radiance;
     if (walk.failed || !is_finite(value(radiance))) return false;
-    if (terms_[pixel_slot_]) {
+    if (adds(pixel_slot_)) {
       for (int c = 0; c < 3; ++c) vertices.seeds().add(radiance[c].node, adjoint[c] / places);
     }
-    if (field_) filtered_->add_path(at, path.paths, film, value(radiance), tape);
+    if (filters) filtered_->add_path(at, paths, film, value(radiance), tape);
     cost.add(rays);
   }
   if (!vertices.seeds().empty()) vertices.seeds().sweep(tape);
   return true;
 }
 
-void ReverseEstimator::add_path(const Path& path, uint64_t seed, Tape& tape,
-                                GradientTile& to) const {
+void ReverseEstimator::add_path(const Path& path, Tape& tape, GradientTile& to) const {
   const auto& [x, y, number] = path.at;
-  const auto pixel = static_cast<uint64_t>(y) * scene().camera.width + x;
   tape.clear();
-  const bool finite = trace(path, Rng(seed, pixel, static_cast<uint64_t>(number)), tape, to) &&
+  const bool finite = trace(path, tape, to) &&
                       add_tape(tape, {x, y, number, ""}, parameters_, to.costs[pixel_slot_], to);
   if (!finite) to.non_finite.add({x, y, number, slot_name(pixel_slot_)});
 }
@@ -230,7 +245,7 @@ void ReverseEstimator::add_tile(const Batch& batch, size_t tile, GradientTile& t
   const TapeScope scope(tape);
   const size_t first = tile * kTileSamples;
   for (size_t i = first; i < std::min(samples(batch), first + kTileSamples); ++i) {
-    add_path(path(batch, i), batch.seed, tape, to);
+    add_path(path(batch, i), tape, to);
   }
 }
 
@@ -244,7 +259,7 @@ void ReverseEstimator::add_sample(const Batch& batch, const PixelSample& at,
   }
   Tape tape(&parameters_.slots());
   const TapeScope scope(tape);
-  add_path(one, batch.seed, tape, to);
+  add_path(one, tape, to);
 }
 
 // A point of a line across which the adjoint jumps.

@@ -27,7 +27,35 @@ class ReverseEstimator final : public GradientEstimator {
   ReverseEstimator& operator=(const ReverseEstimator&) = delete;
 
   const ParameterSlots& parameters() const { return parameters_; }
-  double camera_samples() const;
+  // Of a term, for each path.
+  double samples_of(size_t slot) const;
+  // For each path; see possible_samples().
+  void set_samples(std::vector<double> samples) { planned_ = std::move(samples); }
+  // What a pilot may choose from: never fewer than there are without one where `forest` has the
+  // term, so that what the pilot did not see stays within the error bars. Of `filter` what it has.
+  std::vector<double> possible_samples(size_t slot) const;
+  std::string method_name() const { return options_.method.name(); }
+
+  // For a pilot: from now on only the term in the slot adds something, and batches have so many of
+  // their samples. No slot: all do.
+  void probe(double share, std::optional<size_t> slot) {
+    share_ = share;
+    only_ = slot;
+  }
+  bool computes(size_t slot) const { return terms_[slot] != nullptr; }
+  // Whether a term, or any, takes samples of edges at vertices.
+  bool draws_at_vertices(size_t slot) const {
+    return terms_[slot] && terms_[slot]->uses_vertices();
+  }
+  bool draws_at_vertices() const { return vertices_; }
+  // See Term.
+  double work(size_t slot, const TermCost& cost) const {
+    return terms_[slot] ? terms_[slot]->work(cost) : 0;
+  }
+  double first_work(size_t slot, const TermCost& cost) const {
+    return terms_[slot] ? terms_[slot]->first_work(cost) : 0;
+  }
+  const BackwardOptions& options() const { return options_; }
   // Adds the terms, statistics of the set-up, and warnings.
   void describe(BackwardResult& result) const;
 
@@ -43,18 +71,24 @@ class ReverseEstimator final : public GradientEstimator {
   }
   std::vector<size_t> sizes() const override { return parameters_.sizes(); }
   int most_batches() const override { return std::max(1, options_.batches); }
+  // Those of planned runs are even; a pilot is behind these.
+  Numbers numbers() const override {
+    return planned_.empty() ? Numbers::kIndependent : Numbers::kEvenInBatches;
+  }
   void end_tile(std::vector<Contribution>& contributions) const override;
 
-  bool samples_pixels() const override { return paths_; }
+  bool samples_pixels() const override {
+    return only_ ? *only_ == pixel_slot_ || draws_at_vertices(*only_) : paths_;
+  }
   size_t pixel_slot() const override { return pixel_slot_; }
-  size_t samples(const Batch& batch) const override { return choice_.paths(batch); }
+  size_t samples(const Batch& batch) const override { return choice_.paths(batch, share_); }
   void add_tile(const Batch& batch, size_t tile, GradientTile& to) const override;
   int64_t sample_of(int64_t number) const override { return choice_.sample_of(number); }
   void add_sample(const Batch& batch, const PixelSample& at, GradientTile& to) const override;
 
   double film_samples(size_t slot) const override {
-    if (is_filter(slot)) return terms_[slot] ? filtered_->line_samples() : 0;
-    return terms_[slot] && terms_[slot]->uses_film() ? film_points(slot) : 0;
+    return adds(slot) && (is_filter(slot) || terms_[slot]->uses_film()) ? share_ * film_points(slot)
+                                                                        : 0;
   }
   int film_stream(size_t slot) const override { return types_[slot]->film_stream; }
   void add_film(size_t slot, std::span<const FilmDraw> draws, GradientTile& to) const override;
@@ -62,11 +96,12 @@ class ReverseEstimator final : public GradientEstimator {
  private:
   class VertexAdjoints;
 
-  // Of a term: how many for each path.
-  double samples_of(size_t slot) const;
-  // Of a term with points on the film.
-  double film_points(size_t slot) const {
-    return types_[slot]->on_film_alone() ? camera_samples() : options_.shadow_samples;
+  bool adds(size_t slot) const { return terms_[slot] && (!only_ || *only_ == slot); }
+  // Of a term with points on the film, for each path.
+  double film_points(size_t slot) const;
+  // At every vertex: a whole number, or the probability that a path has one.
+  double vertex_samples(size_t slot) const {
+    return planned_.empty() ? options_.edge_samples : planned_[slot];
   }
   bool is_filter(size_t slot) const { return types_[slot]->moved_film; }
   bool may_move_film() const;
@@ -76,15 +111,19 @@ class ReverseEstimator final : public GradientEstimator {
     PixelSample at;
     double expected;
     double paths;  // of all pixels in the batch
+    Rng key;
   };
   Path path(const Batch& batch, size_t index) const;
-  void add_path(const Path& path, uint64_t seed, Tape& tape, GradientTile& to) const;
+  void add_path(const Path& path, Tape& tape, GradientTile& to) const;
   // Leaves on the tape what a sample contributes; false if it is not finite.
-  bool trace(const Path& path, const Rng& key, Tape& tape, GradientTile& to) const;
+  bool trace(const Path& path, Tape& tape, GradientTile& to) const;
   bool trace(size_t slot, const FilmDraw& draw, Tape& tape, GradientTile& to) const;
   bool trace_line(size_t slot, const FilmDraw& draw, Tape& tape, GradientTile& to) const;
 
-  const BackwardOptions& options_;
+  BackwardOptions options_;
+  std::vector<double> planned_;  // samples of each slot; empty: those of the options
+  double share_ = 1;
+  std::optional<size_t> only_;
   FilmAdjoint film_;
   PixelChoice choice_;
   ParameterSlots parameters_;

@@ -116,7 +116,8 @@ ForwardSums forward_sums(const Scene& scene, std::span<const Parameter> paramete
                          const BackwardOptions& options, const Image& adjoint,
                          const RunSettings& settings) {
   check_task(options.method, Task::kBackward);
-  const auto& [sampler, closed] = *options.method->reverse;
+  const ReverseMethod& method = *options.method->reverse;
+  const auto& [sampler, closed] = std::tie(method.sampler, method.closed);
   const std::vector<std::string>& terms = options.terms;
   const std::vector<const TermType*> types = terms_of(scene, sampler, closed);
   std::vector<bool> computed;

@@ -112,6 +112,12 @@ std::vector<MethodType> term_methods() {
                                "samples allocated by error",
                                "silhouettes", {}, motion_settings(true)));
   methods.back().defaults = {Task::kGradient, Task::kCompare};
+  methods.back().set_up = [gradients = methods.back().set_up](MethodType& to) {
+    gradients(to);
+    to.reverse.reset();
+    if (!to.is_variant())
+      to.reverse = ReverseMethod{.sampler = edge_sampler_type("silhouettes"), .chooses = true};
+  };
   for (const EdgeSamplerType& type : edge_sampler_types()) {
     const bool lists = type.regions;
     methods.push_back(method_row(type.name, type.description, type.name, {},

@@ -380,7 +380,7 @@ TEST(Backward, AgreesWithOtherSamplers) {
         << name;
   }
   EXPECT_THROW(options.method = "oak", InputError);
-  options.method = "adaptive";  // in forward mode alone
+  options.method = "fd";  // in forward mode alone
   EXPECT_THROW(backward(scene, adjoint, options, settings), InputError);
 }
 

@@ -57,20 +57,24 @@ TEST(FilmField, HasTheMeanOfPositionsThatAreHeld) {
     mirror = !mirror;
     const Scene scene = ball_and_screens(files, film, mirror, !mirror);
     const Image adjoint = random_adjoint(scene);
-    for (const char* method : {"forest", "silhouettes"}) {
+    for (const std::string method : {"forest", "silhouettes", "adaptive"}) {
       BackwardOptions options;
       options.method = Method(method);
       options.batches = 64;
       options.parameters = {"ball.translate.x",   "ball.translate.y",   "ball.scale",
                             "mirror.translate.x", "sensor.translate.x", "sensor.fov"};
       RunSettings settings;
-      settings.spp = 1024;
+      settings.spp = method == "adaptive" ? 1300 : 1024;
       settings.threads = 2;
       options.least_detail = kAlways;
       settings.seed = 1;
       const BackwardResult follows = backward(scene, adjoint, options, settings);
       EXPECT_STREQ(follows.terms.back().name.c_str(), "filter");
       EXPECT_EQ(follows.non_finite.count, 0u);
+      if (method == "adaptive") {
+        EXPECT_NE(follows.decision, "");
+        options.method = Method("forest");
+      }
       options.least_detail = kNever;
       settings.seed = 2;
       const BackwardResult held = backward(scene, adjoint, options, settings);
@@ -88,7 +92,7 @@ TEST(FilmField, HasTheMeanOfPositionsThatAreHeld) {
   EXPECT_GE(summary.p_largest, 1e-6);
 }
 
-// Where edges are missing, what positions do would not have mean zero: a bulb's shadows in a mirror.
+// Where edges are missing, what positions do has no mean of zero: a bulb's shadows in a mirror.
 TEST(FilmField, IsHeldWhereEdgesAreMissing) {
   const TempFiles files;
   const Scene scene = ball_and_screens(files, R"(<rfilter type="box"/>)", true, true);
@@ -173,6 +177,43 @@ TEST(FilmField, TakesOutWhatFineDetailCosts) {
   fmt::print("variance of positions that are held: {:.1f} times (log +- {:.2f})\n",
              std::exp(gain.mean()), gain.standard_error());
   EXPECT_GT(gain.z_score(std::log(2.0)), 3);
+}
+
+// Where `adaptive` chooses numbers of samples, too: the same mean, on any number of threads.
+TEST(FilmField, IsRightBehindAPilot) {
+  const TempFiles files;
+  const Scene scene = triangles(files, 1000, 0.16);
+  const Image adjoint = smooth_adjoint(scene);
+  BackwardOptions options;
+  options.parameters = {"leaves.translate.x", "leaves.translate.y", "leaves.rotate.z",
+                        "leaves.scale"};
+  options.batches = 64;
+  RunSettings settings;
+  settings.spp = 1 + 85000 / (scene.film.crop_width * scene.film.crop_height);
+  settings.threads = 3;
+  options.method = Method("adaptive");
+  const BackwardResult chosen = backward(scene, adjoint, options, settings);
+  EXPECT_NE(chosen.decision, "");
+  EXPECT_EQ(chosen.terms.back().name, "filter");
+  EXPECT_GT(chosen.terms.back().samples, 0);
+  settings.threads = 1;
+  const BackwardResult alike = backward(scene, adjoint, options, settings);
+  options.method = Method("forest");
+  settings.threads = 2;
+  settings.spp *= 4;
+  settings.seed = 7;
+  const BackwardResult usual = backward(scene, adjoint, options, settings);
+  EXPECT_EQ(usual.terms.back().samples, chosen.terms.back().samples);
+  std::vector<double> z;
+  for (size_t p = 0; p < options.parameters.size(); ++p) {
+    const Moments &a = chosen.parameters[p].moments, &b = usual.parameters[p].moments;
+    EXPECT_EQ(a.mean(0), alike.parameters[p].moments.mean(0));
+    z.push_back((a.mean(0) - b.mean(0)) / std::sqrt(a.variance(0) + b.variance(0)));
+    fmt::print("{:20} {:9.3g} +- {:7.2g}, usual {:9.3g} +- {:7.2g}, z {:.2f}\n",
+               options.parameters[p], a.mean(0), std::sqrt(a.variance(0)), b.mean(0),
+               std::sqrt(b.variance(0)), z.back());
+  }
+  EXPECT_GE(summarize(z).p_largest, 1e-6);
 }
 
 TEST(FilmField, LeavesCoarseScenesAlone) {

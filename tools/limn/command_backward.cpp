@@ -210,7 +210,7 @@ class BackwardCommand final : public Command {
                    {"threads", settings.threads},
                    {"seconds", result.seconds},
                    {"setup_seconds", result.setup_seconds},
-                   {"method", options_.method.name()},
+                   {"method", over_faces() ? options_.method.name() : result.method},
                    {"points", name_of(options_.points)},
                    {"warnings", warnings_.lines()},
                    {"non_finite", result.non_finite.count}};
@@ -225,6 +225,9 @@ class BackwardCommand final : public Command {
     if (stats_) {
       json stats = stats_json(result.stats);
       stats["terms"] = costs_json(result.terms);
+      for (const TermRun& term : result.terms)
+        if (term.computed) stats["samples"][term.name] = term.samples;
+      if (!result.decision.empty()) stats["pilot"] = result.decision;
       stats["contributions"] = result.contributions;
       stats["tape_bytes"] = result.tape_bytes;
       report["stats"] = stats;
@@ -237,6 +240,7 @@ class BackwardCommand final : public Command {
     }
     if (!stats_) return;
     print_stats(result.stats, result.terms);
+    if (!result.decision.empty()) fmt::print("{}\n", result.decision);
     fmt::print("{} numbers added to the gradient; the longest tape: {} bytes\n",
                result.contributions, result.tape_bytes);
   }

@@ -32,8 +32,9 @@ struct BackwardOptions {
   // Every pixel gets the same number of paths. Else a quarter of them is spread evenly and the rest
   // in proportion to |A|, summed over channels.
   bool uniform_pixels = false;
-  // How edges are sampled at vertices of paths, or (analytic) light in closed form in their place,
-  // in the scenes that the method takes. InputError for one that has no reverse mode.
+  // How edges are sampled at vertices of paths (adaptive: by a pilot, with numbers of samples, in
+  // long runs that leave both to it), or (analytic) light in closed form in their place, in the
+  // scenes that the method takes. InputError for one that has no reverse mode.
   Method method{Task::kBackward};
   // With "analytic" and faces there is one term, `faces`, and no numbers of samples, no batches and
   // no standard errors but 0; InputError for faces with another method, and in parts.
@@ -69,6 +70,8 @@ struct ParameterAdjoint {
 
 struct BackwardResult {
   std::vector<ParameterAdjoint> parameters;  // in the order asked for
+  std::string method;                        // that ran: of adaptive the one that it chose
+  std::string decision;                      // what its pilot found; empty without one
   std::vector<TermRun> terms;                // all that the scene has
   int64_t spp = 0;                           // paths per pixel that were finished, on average
   int batches = 0;                           // that they came in, all of one size to a sample
@@ -87,7 +90,8 @@ struct BackwardResult {
 // adjoint: crop_height by crop_width, three channels, or one that stands for the luminance.
 // settings.spp paths per pixel, in batches that give the standard errors; interruption
 // drops the batch in progress. With settings.seconds as many batches of one size as fit, two at
-// least: a run without limit with the samples and batches that the result names has the same bits.
+// least: a run without limit with the samples and batches that the result names has the same bits,
+// unless a pilot chose by time.
 // The same seed gives the same bits on any number of threads; memory does not grow with samples.
 // InputError for unknown parameters or terms, numbers of samples out of range, and for an adjoint
 // of another size or one that is not finite.

@@ -28,7 +28,8 @@ struct ImageMethod {
 // How a method computes in reverse mode.
 struct ReverseMethod {
   EdgeSamplerType sampler;
-  bool closed = false;  // light in closed form
+  bool closed = false;   // light in closed form
+  bool chooses = false;  // a pilot chooses between `forest` and this sampler
 };
 
 struct MethodType {

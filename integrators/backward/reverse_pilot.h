@@ -1,0 +1,28 @@
+#pragma once
+// What `adaptive` is in reverse mode: a pilot chooses between the edges of `forest` and the listed
+// silhouettes of `silhouettes`, and how many samples each term takes. The run behind it is that of
+// the method chosen; the pilot's samples are thrown away.
+#include <memory>
+#include <string>
+
+#include "integrators/backward/reverse_estimator.h"
+#include "limn/integrators/backward.h"
+#include "limn/integrators/run.h"
+
+namespace limn {
+
+struct ReversePlan {
+  // With its numbers of samples.
+  std::unique_ptr<ReverseEstimator> estimator;
+  std::string decision;  // for people to read; empty if there was nothing to decide
+};
+
+// options: of the method `adaptive` or another; then, and where samples, terms or uniform pixels
+// are asked for, in runs too short for a pilot and where the scene has times, there is no pilot:
+// `adaptive` is `forest` then, or `silhouettes` if one of its own terms is asked for. Pilots take
+// about an eighth of the run, which watch has timed since it began. The same seed and samples give
+// the same plan on any number of threads; a limit of time makes it depend on the machine.
+ReversePlan planned(const Scene& scene, const Image& adjoint, const BackwardOptions& options,
+                    const RunSettings& settings, const Stopwatch& watch);
+
+}  // namespace limn

@@ -1,0 +1,106 @@
+// What a pilot of reverse mode chooses, and that the run behind it is right.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "limn/core/image.h"
+#include "limn/integrators/backward.h"
+#include "support/meshes.h"
+#include "support/scenes.h"
+
+namespace limn {
+namespace {
+
+// A torus between a lamp and a glossy floor.
+Scene shadowed(const TempFiles& files) {
+  SceneParts parts;
+  parts.width = parts.height = 32;
+  parts.max_depth = 3;
+  parts.origin = {0, 2.5, 4};
+  parts.target = {0, 0.4, 0};
+  parts.body = square("floor", 2.5, -90, {0, 0, 0}, conductor("gloss", 0.3)) +
+               obj_shape("body", write_mesh(files, "body.obj", torus_mesh(9, 5)), false, 0.6,
+                         {0, 0.9, 0}, diffuse("clay", ".6, .5, .4")) +
+               square("lamp", 0.3, 90, {0.5, 3.5, 1}, area_light("glow", "40, 40, 40"));
+  return make_scene(files, parts);
+}
+
+BackwardResult run(const Scene& scene, const char* method, int spp, uint64_t seed,
+                   int threads = 2) {
+  Image adjoint(scene.film.crop_width, scene.film.crop_height, 3);
+  for (size_t i = 0; i < adjoint.data.size(); ++i)
+    adjoint.data[i] = static_cast<float>(std::sin(0.1 * static_cast<double>(i / 3)));
+  BackwardOptions options;
+  options.parameters = {"body.translate.x", "body.translate.y", "body.rotate.z"};
+  options.method = Method(method);
+  RunSettings settings;
+  settings.spp = spp;
+  settings.seed = seed;
+  settings.threads = threads;
+  return backward(scene, adjoint, options, settings);
+}
+
+std::vector<double> means(const BackwardResult& result) {
+  std::vector<double> values;
+  for (const ParameterAdjoint& p : result.parameters) values.push_back(p.moments.mean(0));
+  return values;
+}
+
+TEST(ReversePilot, LeavesShortRunsAlone) {
+  const TempFiles files;
+  const Scene scene = shadowed(files);
+  const BackwardResult chosen = run(scene, "adaptive", 16, 3);
+  EXPECT_EQ(chosen.method, "forest");
+  EXPECT_EQ(chosen.decision, "");
+  EXPECT_EQ(means(chosen), means(run(scene, "forest", 16, 3)));
+}
+
+TEST(ReversePilot, ChoosesAlikeOnAnyNumberOfThreads) {
+  const TempFiles files;
+  const Scene scene = shadowed(files);
+  const BackwardResult one = run(scene, "adaptive", 96, 3, 1);
+  EXPECT_NE(one.decision, "");
+  const BackwardResult three = run(scene, "adaptive", 96, 3, 3);
+  EXPECT_EQ(one.decision, three.decision);
+  EXPECT_EQ(means(one), means(three));
+}
+
+// Squared error x work, with rays for work, falls by more than pilots can be wrong by; the mean is
+// that of `silhouettes`, and error bars are true: six runs' chi-square of Hotelling's kind, each
+// parameter by itself, within what has a probability of 1e-4.
+TEST(ReversePilot, GainsAndHasTrueErrorBars) {
+  const TempFiles files;
+  const Scene scene = shadowed(files);
+  const BackwardResult truth = run(scene, "silhouettes", 512, 1000);
+  constexpr int kRuns = 6, kCompared = 2;
+  double usual = 0, squares[3] = {}, own = 0;
+  for (int seed = 1; seed <= kRuns; ++seed) {
+    const BackwardResult chosen = run(scene, "adaptive", 84, seed);
+    const auto work = [](const BackwardResult& result) {
+      double rays = 0;
+      for (const TermRun& term : result.terms) rays += static_cast<double>(term.cost.rays);
+      return rays;
+    };
+    for (int k = 0; k < 3; ++k) {
+      const Moments &b = chosen.parameters[k].moments, &t = truth.parameters[k].moments;
+      const double d = b.mean(0) - t.mean(0);
+      squares[k] += d * d / (b.variance(0) + t.variance(0));
+    }
+    if (seed > kCompared) continue;
+    const BackwardResult plain = run(scene, "forest", 84, seed);
+    for (int k = 0; k < 3; ++k) {
+      usual += plain.parameters[k].moments.variance(0) * work(plain);
+      own += chosen.parameters[k].moments.variance(0) * work(chosen);
+    }
+  }
+  EXPECT_LT(own, 0.5 * usual);
+  for (const double square : squares) {
+    // Of Student's t with 15 degrees of freedom a square has mean 15/13 and variance 3.1: of a sum
+    // of six, 7 and 4.3; the bound is at five of them.
+    EXPECT_LT(square, 7 + 5 * 4.3);
+    EXPECT_GT(square, 0.3);
+  }
+}
+
+}  // namespace
+}  // namespace limn
