@@ -166,8 +166,11 @@ Score find_power(const ProbeScores& places, const Residual& residual, const Grad
     result.within = result.power[i].of_whole();
     worst = behind[i];
   }
-  // Where all is noise.
-  if (sum == 0 && whole.score.error > 0) result.within = std::numeric_limits<double>::infinity();
+  // Where all is noise, or nothing at all.
+  if (sum == 0) {
+    const bool noisy = whole.score.value != 0 || whole.score.gradient_variance > 0;
+    result.within = noisy ? std::numeric_limits<double>::infinity() : 0;
+  }
   result.needed_spp = static_cast<double>(run.spp) *
                       std::max(1.0, std::pow(result.within / kCheckWanted, kSamplesPower));
   return worst->score;

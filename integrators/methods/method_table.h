@@ -45,7 +45,7 @@ inline std::vector<MethodType> other_methods() {
            .image = ImageMethod{},
            .run = run_blurred},
           {.name = "blurred-published",
-           .description = "the same with weights by depth alone (Quinn 2021)",
+           .description = "the same with weights opacity times exp(-depth / gamma) (Quinn 2021)",
            .terms = {"blurred"},
            .blurs = BlurWeights::kPublished,
            .biased = true,

@@ -413,7 +413,7 @@ TEST(Fit, QuasiNewtonRefusesNoise) {
   options.backward.method = "forest";
   refuses(options, "method forest");
   options.backward.method = "adaptive";
-  refuses(options, ", analytic");
+  refuses(options, "take the method analytic");
   options = exact_options();
   options.loss = LossKind::kL1;
   refuses(options, "smooth loss");

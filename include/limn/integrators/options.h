@@ -77,16 +77,17 @@ void visit_options(Like<WarpOptions> auto& o, auto&& visit) {
 
 void visit_options(Like<Blur> auto& o, auto&& visit) {
   visit(o.sigma, Option{"sigma",
-                        "Square of the width over which faces fade beyond their sides, in scene "
-                        "units (methods blurred and blurred-published)",
+                        "Square of the width over which faces fade beyond their sides, in squared "
+                        "scene units (methods blurred and blurred-published)",
                         1e-30L, 1e30L}
                      .or_zero("a sixteenth of the median side, squared"));
-  visit(o.gamma,
-        Option{"gamma",
-               "Depth over which surfaces mix, in scene units (methods blurred and "
-               "blurred-published)",
-               1e-15L, 1e15L}
-            .or_zero("none; of blurred-published a sixteenth of the scene's diagonal, its least"));
+  visit(
+      o.gamma,
+      Option{"gamma",
+             "Depth over which surfaces mix, in scene units (methods blurred and "
+             "blurred-published)",
+             1e-15L, 1e15L}
+          .or_zero("none; of blurred-published its minimum, a sixteenth of the scene's diagonal"));
 }
 
 void visit_options(Like<RenderOptions> auto& o, auto&& visit) {
