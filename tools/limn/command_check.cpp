@@ -57,6 +57,8 @@ void print_verdict(const CheckResult& r, double seconds) {
     fmt::print("  DISAGREE at the level {:.0e}: suspect the {} term", kCheckLevel, r.suspect);
     const Suspicion& s = r.suspicions[r.gradient.term(r.suspect)];
     fmt::print(": the differences hold {:.3g} times of it (z = {:.1f})\n", 1 + s.factor, s.z);
+  } else if (r.verdict == Verdict::kAgree && r.is_zero()) {
+    fmt::print("  agree: both are zero, without noise\n");
   } else if (r.verdict == Verdict::kAgree) {
     fmt::print("  agree: an error of {} of the derivative would have shown\n", percent(r.within));
   } else if (r.verdict == Verdict::kNotComplete) {
@@ -175,7 +177,7 @@ class CheckCommand final : public Command {
     app.add_flag("--reverse", reverse_,
                  "Compare reverse mode with forward mode instead, by the sum over pixels of the "
                  "derivative times a random image. An array parameter moves along a random "
-                 "direction. --method is then a method of backward")
+                 "direction. --method is then one of backward (default: forest)")
         ->excludes("--time");
   }
 

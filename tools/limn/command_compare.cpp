@@ -332,7 +332,7 @@ void CompareCommand::add_options(CLI::App& app) {
       ->check(within(1, 1 << 20))
       ->capture_default_str();
   app.add_option("--reference", command_.reference,
-                 "Reference that limn compare wrote for the same scene and parameter (default: the "
+                 "Reference that limn compare wrote for the same scene and task (default: the "
                  "one in the output folder, else a new one)")
       ->type_name("FILE.exr");
   app.add_option(

@@ -1,5 +1,6 @@
 #pragma once
 // A gradient against finite differences.
+#include <algorithm>
 #include <functional>
 
 #include "limn/integrators/differences.h"
@@ -88,9 +89,13 @@ struct CheckResult {
   WidenedErrors widened;
   double p = 1;       // of the whole first run: windows, image and terms, paid for all of them
   std::string found;  // where it is smallest: "the whole image", "the camera term", ...
-  std::vector<CheckPower> power;             // all terms together, then each
-  double within = 0;                         // the largest CheckPower::of_whole()
-  double needed_spp = 0;                     // for `within` to be kCheckWanted
+  std::vector<CheckPower> power;  // all terms together, then each
+  double within = 0;              // the largest CheckPower::of_whole()
+  double needed_spp = 0;          // for `within` to be kCheckWanted
+  // Whether no term has any magnitude.
+  bool is_zero() const {
+    return std::ranges::all_of(power, [](const CheckPower& part) { return part.share == 0; });
+  }
   std::optional<Confirmation> confirmation;  // if p < kCheckStageLevel
   // What would disagree is no more than half of what the image's slopes before and after the
   // parameter's value differ by, and they do: shapes that touch and part, a face edge-on to a
