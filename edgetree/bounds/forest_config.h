@@ -26,7 +26,7 @@ struct ForestConfig {
   // nodes are read.
   static constexpr int kNoHeight = -1, kEdgesOnly = 0, kAnyHeight = 255;
   int look_ahead = 2;
-  // Node expansion: a child's box tells little of its weight if the lobe is narrow or p is near.
+  // Node expansion: a child's box bounds its weight loosely if the lobe is narrow or p is near.
   // Then its own children are evaluated, and for narrow lobes up to this many nodes at the top are
   // expanded. 0 disables both.
   int most_open = 8;

@@ -190,7 +190,7 @@ Ints own_edges(const EdgeNode& node, const ForestQuery& query, const Floats3& w_
   const Ints near = alive & (max(height(w_0), height(w_1)) <= kNearPlane);
   for (uint32_t lanes = bits(near); lanes != 0; lanes &= lanes - 1) {
     const int lane = std::countr_zero(lanes);
-    if (is_own_edge(query.input, query.asked, node.edge_at(lane))) own[lane] = -1;
+    if (is_own_edge(query.input, query.source, node.edge_at(lane))) own[lane] = -1;
   }
   return own;
 }
@@ -350,7 +350,7 @@ ForestQuery::ForestQuery(const Forest& tree, const LightClusters* clusters,
       lobe(query.lobe, query.n, query.wi),
       environment(pyramid),
       input(scene),
-      asked(query),
+      source(query),
       at_rest(is_at_rest(query, scene.lane_scale)) {
   if (clusters) lights.emplace(*clusters, query.p);
   for (int k = 0; k < 3; ++k) n[k] = static_cast<float>(query.n[k]);

@@ -39,7 +39,7 @@ struct ForestQuery {
   float p[2][3];               // unit * p = p[0] + p[1], a sum of two floats
   bool any_direction = false;  // speed in any direction counts, not only across the line of sight
   const EdgeSamplerInput& input;
-  const EdgeQuery& asked;
+  const EdgeQuery& source;
   bool at_rest;
   std::optional<Plane> own_plane;  // plane of the query's own face, if any
 

@@ -42,7 +42,7 @@ void VertexAdjoint::add(const Rgb<double>& amount) {
 bool FilmPointAdjoint::at(const FilmPlace& place) {
   place_ = place;
   adjoint_ = film_.at(place.x, place.y);
-  return asked_ = !is_black(adjoint_);
+  return has_adjoint_ = !is_black(adjoint_);
 }
 
 bool FilmPointAdjoint::takes(const BoundaryForm& form, const Rng&) {

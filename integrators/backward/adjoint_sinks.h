@@ -44,7 +44,7 @@ class FilmPointAdjoint final : public FilmSink {
     book_on(own_);
   }
   // Whether its pixels have an adjoint, and whether it added something.
-  bool asked() const { return asked_; }
+  bool has_adjoint() const { return has_adjoint_; }
   bool added() const { return added_; }
   const FilmPlace& place() const { return place_; }
   const Seeds& seeds() const { return seeds_; }
@@ -67,7 +67,7 @@ class FilmPointAdjoint final : public FilmSink {
   TermCost own_;
   FilmPlace place_;
   Rgb<double> adjoint_;
-  bool asked_ = true, added_ = false;
+  bool has_adjoint_ = true, added_ = false;
   const BoundaryForm* form_ = nullptr;
 };
 

@@ -111,10 +111,10 @@ BackwardResult run(const Scene& scene, std::unique_ptr<Estimator> owned, const I
 }  // namespace
 
 BackwardResult backward(const Scene& scene, const Image& adjoint, const BackwardOptions& options,
-                        const RunSettings& asked) {
+                        const RunSettings& requested) {
   check(options);
   const Stopwatch watch;
-  const RunSettings settings = settings_for(options.points, asked);
+  const RunSettings settings = settings_for(options.points, requested);
   if (options.points == FilmPoints::kFaces) {
     auto faces = std::make_unique<FacesGradient>(scene, adjoint, options, settings.threads);
     return run(scene, std::move(faces), adjoint, options, settings, watch);

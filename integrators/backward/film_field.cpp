@@ -22,8 +22,8 @@ struct Met {
   Vec3d x, normal;
 };
 
-// Whether radiance is likely to jump between two points: they lie on different shapes, or on
-// surfaces more than about 18 degrees apart (not tuned).
+// Whether radiance is likely to be discontinuous between two points: they lie on different shapes,
+// or on surfaces more than about 18 degrees apart (not tuned).
 bool are_apart(const Met& a, const Met& b) {
   constexpr double kSine = 0.3, kCosine = 0.95;
   if (a.face == b.face) return false;
@@ -47,7 +47,7 @@ std::unique_ptr<FilmField> FilmField::make(const PathContext& context, double le
                                            ParameterSlots& slots, int threads) {
   std::unique_ptr<FilmField> field(new FilmField(context.scene, slots.slots()));
   const size_t pixels = static_cast<size_t>(field->width_) * field->height_;
-  // Scenes without detail are told by every seventh pixel. Not tuned.
+  // Scenes without detail are recognised by every seventh pixel. Not tuned.
   constexpr size_t kStep = 7;
   constexpr double kLeastShare = 1.0 / 8;
   std::vector<Sight> seen;

@@ -90,7 +90,7 @@ void FilterAdjoint::add_lines() {
   const int width = film_.crop_width, height = film_.crop_height;
   double total = 0;
   for (const auto& a : adjoint_.pixels()) total += magnitude(a);
-  // Inside a line A may jump though it does not in its middle.
+  // A may differ across a line though not at its middle.
   const double even = box ? 0 : 0.25 * total / (static_cast<double>(width) * height);
   for (int x = 0; x <= width; x += box ? 1 : width) {
     for (int y = 0; y < height; ++y) add_line({x, y, true}, even);
@@ -107,7 +107,7 @@ void FilterAdjoint::add_line(const Line& line, double even) {
       field_.slot(line.column + !line.vertical, line.row + line.vertical) == 0) {
     return;
   }
-  const double weight = magnitude(jump(line, 0.5)) + even;
+  const double weight = magnitude(difference(line, 0.5)) + even;
   if (weight == 0) return;
   lines_.push_back(line);
   choice_of_line_.add(weight);
@@ -118,7 +118,7 @@ FilmPosition FilterAdjoint::place(const Line& line, double along) const {
   return line.vertical ? FilmPosition{x, y + along} : FilmPosition{x + along, y};
 }
 
-Rgb<double> FilterAdjoint::jump(const Line& line, double along) const {
+Rgb<double> FilterAdjoint::difference(const Line& line, double along) const {
   const int count = line.vertical ? film_.crop_width : film_.crop_height;
   const int number = line.vertical ? line.column : line.row;
   if (film_.filter.kind != Filter::Kind::kBox) {
@@ -137,7 +137,7 @@ FilterAdjoint::LinePoint FilterAdjoint::line_point(double u) const {
   const Line& line = lines_[draw.index];
   const double along = draw.fraction;
   const uint32_t axis = line.vertical ? 0 : 1;
-  LinePoint point{place(line, along), jump(line, along) * (1 / draw.probability), {}, {}};
+  LinePoint point{place(line, along), difference(line, along) * (1 / draw.probability), {}, {}};
   for (int k = 0; k < 2; ++k) {
     const uint32_t slot =
         field_.slot(line.column + (line.vertical ? 0 : k), line.row + (line.vertical ? k : 0));

@@ -2,7 +2,7 @@
 // What moving positions on the film change in the pixels, in reverse mode. With A(x) the adjoint
 // that a position sees, of all filters that reach it, and f the radiance there, it is
 //   integral of f div(A V) dx  =  integral of f (A div V + V . grad A) dx
-//                                 + integral over lines where A jumps of f (A_+ - A_-) V . n dl,
+//                                 + integral over A's discontinuities of f (A_+ - A_-) V . n dl,
 // n from - to +. Neighbouring pixels cancel but for what A differs by. Paths of the pixels give
 // the first, and samples of the lines the second: the sides of pixels with a box filter, else the
 // rim of a crop that cuts filters.
@@ -26,12 +26,12 @@ class FilterAdjoint {
   void add_path(const PixelSample& pixel, double paths, const FilmPosition& at,
                 const Rgb<double>& radiance, Tape& tape) const;
 
-  // Samples of lines for each path: none where A hardly jumps.
+  // Samples of lines for each path: none where A is nearly continuous.
   double line_samples() const { return line_samples_; }
   struct LinePoint {
     FilmPosition at;
-    Rgb<double> jump;   // of A, over the density of the point [1 / pixel]
-    uint32_t slots[2];  // of V . n, between two corners, and their weights
+    Rgb<double> difference;  // of A, over the density of the point [1 / pixel]
+    uint32_t slots[2];       // of V . n, between two corners, and their weights
     double weights[2];
   };
   // u in [0, 1).
@@ -42,7 +42,7 @@ class FilterAdjoint {
     int column, row;  // of its first corner
     bool vertical;
   };
-  Rgb<double> jump(const Line& line, double along) const;
+  Rgb<double> difference(const Line& line, double along) const;
   void add_lines();
   void add_line(const Line& line, double even);
   FilmPosition place(const Line& line, double along) const;

@@ -16,7 +16,7 @@ namespace limn {
 // A path with the number of paths that its pixel has on average in the batch.
 struct PixelPath {
   size_t pixel;     // of the crop, row by row
-  uint64_t sample;  // tells the random numbers of a pixel's paths apart
+  uint64_t sample;  // distinguishes the random numbers of a pixel's paths
   double expected;
 };
 

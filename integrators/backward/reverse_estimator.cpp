@@ -9,7 +9,7 @@
 
 #include "integrators/backward/adjoint_sinks.h"
 #include "integrators/edges/scene_edges.h"
-#include "integrators/edges/texture_jumps.h"
+#include "integrators/edges/texture_discontinuities.h"
 #include "integrators/estimates/contributions.h"
 #include "integrators/methods/selection.h"
 #include "integrators/paths/camera_path.h"
@@ -62,7 +62,7 @@ ReverseEstimator::ReverseEstimator(const Scene& scene, const Image& adjoint,
   }
 }
 
-// Where all terms are sampled, of which all change with it, and at every jump of radiance there is
+// Where all terms are sampled, of which all change with it, and at every discontinuity there is
 // an edge: of what smooth lobes show there may be none.
 bool ReverseEstimator::may_move_film() const {
   return (moved_.vertices || moved_.camera) && options_.least_detail <= 1 &&
@@ -262,7 +262,7 @@ void ReverseEstimator::add_sample(const Batch& batch, const PixelSample& at,
   add_path(one, tape, to);
 }
 
-// A point of a line across which the adjoint jumps.
+// A point of a line across which the adjoint is discontinuous.
 bool ReverseEstimator::trace_line(size_t slot, const FilmDraw& draw, Tape& tape,
                                   GradientTile& to) const {
   TermCost& cost = to.costs[slot];
@@ -276,7 +276,7 @@ bool ReverseEstimator::trace_line(size_t slot, const FilmDraw& draw, Tape& tape,
   tracer.follow_rays({&start, 1}, {&walk, 1});
   cost.add(rays);
   if (walk.failed || !is_finite(walk.sums.radiance)) return false;
-  const double weight = weighed(point.jump, walk.sums.radiance) * draw.share;
+  const double weight = weighed(point.difference, walk.sums.radiance) * draw.share;
   for (int k = 0; k < 2; ++k) tape.contribute(point.slots[k], weight * point.weights[k]);
   ++cost.counted;
   return true;
@@ -298,7 +298,7 @@ bool ReverseEstimator::trace(size_t slot, const FilmDraw& draw, Tape& tape,
   if (to.log)
     to.log->push_back(fmt::format("film point ({:.6f}, {:.6f})", point.place().x, point.place().y));
   if (!point.added()) {
-    ++(point.asked() ? cost.occluded : cost.zero_weight);
+    ++(point.has_adjoint() ? cost.occluded : cost.zero_weight);
     return true;
   }
   ++cost.counted;

@@ -176,7 +176,7 @@ struct Candidate {
   double product(const std::vector<double>& samples) const {
     double error = 0, work = 0;
     for (size_t slot = 0; slot < figures.size(); ++slot) {
-      if (samples[slot] == 0) continue;  // where the adjoint jumps nowhere
+      if (samples[slot] == 0) continue;  // where the adjoint is continuous
       error += figures[slot].variance / samples[slot];
       work += figures[slot].cost_of(samples[slot]);
     }

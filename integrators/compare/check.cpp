@@ -214,7 +214,7 @@ class Checker {
         windows_(scene.film, block_, fine_) {
     const Parameter parameter = find_parameter(scene, options.parameter);
     natural_step_ = parameter.natural_step;
-    jumps_ = moved_in(scene, {&parameter, 1}).any() || find_smooth(scene);
+    edges_move_ = moved_in(scene, {&parameter, 1}).any() || find_smooth(scene);
     if (options.method->blurs) blur_ = resolved(options.method->blurred_by(options.blur), scene);
   }
 
@@ -371,7 +371,8 @@ class Checker {
     const Film& film = scene_.film;
     const auto radiance =
         sum_blocks(means(runs.gradient.radiance), film.crop_width, film.crop_height, fine_);
-    return {windows_, runs.gradient, runs.differences.extrapolated, radiance, runs.step, jumps_};
+    return {windows_, runs.gradient, runs.differences.extrapolated,
+            radiance, runs.step,     edges_move_};
   }
 
   // The second run, which takes the first one's place. False if it was interrupted.
@@ -484,7 +485,7 @@ class Checker {
   const GradientRun& run_;
   int block_, fine_;
   Windows windows_;
-  bool jumps_ = true;
+  bool edges_move_ = true;
   CheckSamples samples_;
   int round_ = 0, gradient_round_ = -1;
   double natural_step_ = 0, last_step_ = 0;

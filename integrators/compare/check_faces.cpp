@@ -16,7 +16,7 @@ namespace {
 constexpr int kSteps = 6;
 constexpr double kShrink = 0.25;
 
-// What is told as exact is confirmed only by differences that are known this well. Not tuned.
+// What is said to be exact is confirmed only by differences that are known this well. Not tuned.
 constexpr double kWanted = 1e-3;
 
 // Of images, over what they hold: some hundred units in the last place.
@@ -104,18 +104,18 @@ FacesCheck check_faces(const Scene& scene, const CheckOptions& options, const Ru
   result.non_finite = result.gradient.non_finite;
   result.interrupted = result.gradient.spp == 0 || interrupted(settings);
   if (result.interrupted) return result;
-  const std::vector<double> told = means(result.gradient.parameters[0].total);
+  const std::vector<double> gradient = means(result.gradient.parameters[0].total);
   const auto found =
       find_differences(scene, parameter, options.step > 0 ? options.step : parameter.natural_step,
-                       size_of(told), settings, result.non_finite);
+                       size_of(gradient), settings, result.non_finite);
   result.interrupted = !found;
   if (!found) return result;
   result.step = found->step;
-  result.gradient_sum = sum_of(told);
+  result.gradient_sum = sum_of(gradient);
   result.difference_sum = sum_of(found->best);
-  const double size = std::max(size_of(told), size_of(found->best));
+  const double size = std::max(size_of(gradient), size_of(found->best));
   const double scale = size > 0 ? 1 / size : 0;
-  result.error = scale * size_of(minus(told, found->best));
+  result.error = scale * size_of(minus(gradient, found->best));
   result.known = scale * found->least;
   // Of the last two steps the smaller one has a fifteenth of the change as its error where the
   // image is smooth, all of it where rounding rules.

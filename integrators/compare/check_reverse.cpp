@@ -204,9 +204,9 @@ std::vector<ReverseCheck> check_reverse(const Scene& scene, const BackwardOption
   const Image adjoint = random_adjoint(scene.film, mix_bits(settings.seed));
   std::vector<Compared> list;
   std::vector<Parameter> parameters;
-  const std::vector<Parameter> asked = reverse_parameters(scene, options);
-  for (size_t place = 0; place < asked.size(); ++place) {
-    for (const Compared& one : compared(scene, asked[place], place, settings.seed)) {
+  const std::vector<Parameter> requested = reverse_parameters(scene, options);
+  for (size_t place = 0; place < requested.size(); ++place) {
+    for (const Compared& one : compared(scene, requested[place], place, settings.seed)) {
       list.push_back(one);
       parameters.push_back(one.forward);
     }

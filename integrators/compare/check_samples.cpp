@@ -10,7 +10,7 @@ namespace {
 // A short run does not know its variances well: the next one takes so many times its time at most.
 // Not tuned.
 constexpr double kMostGrowth = 16;
-// The error aimed at, over that asked for: variances are known to some ten per cent. Not tuned.
+// The error aimed at, over the one requested: variances are known to some ten per cent. Not tuned.
 constexpr double kMargin = 0.85;
 // With steps that shrink as n^-1/5 the variance of edges in differences goes with n^-4/5.
 constexpr double kVariancePower = 1.25;

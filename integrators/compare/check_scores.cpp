@@ -112,7 +112,7 @@ std::vector<double> Windows::spread(const std::vector<double>& weights) const {
 
 Residual::Residual(const Windows& windows, const GradientResult& gradient,
                    const DifferenceEstimate& differences, const std::vector<double>& radiance,
-                   double step, bool jumps)
+                   double step, bool edges_move)
     : windows_(windows) {
   const ParameterGradient& g = gradient.parameters[0];
   gradient_ = gather(g.total_blocks);
@@ -131,12 +131,12 @@ Residual::Residual(const Windows& windows, const GradientResult& gradient,
     rare_gradient_.magnitude.push_back(edges[i]);
     rare_gradient_.of_mean_size.push_back(edges[i] * of_edges.mean / samples);
     rare_gradient_.of_large_size.push_back(edges[i] * of_edges.large / samples);
-    // Differences may hold all of it as events; a jump that has not been seen at all is as large as
+    // Differences may hold all of it as events; one that has not been seen at all is as large as
     // the light of a pixel, over both steps.
     const double all =
         std::max({edges[i], std::fabs(of_differences[i]), std::fabs(g.total_blocks.mean(i))});
-    const double jump = jumps ? radiance[i] / pixels / (2 * step) : 0;
-    const double large = std::max(of_steps.large, jump);
+    const double unseen = edges_move ? radiance[i] / pixels / (2 * step) : 0;
+    const double large = std::max(of_steps.large, unseen);
     rare_differences_.magnitude.push_back(all);
     rare_differences_.of_mean_size.push_back(all * of_steps.mean / difference_samples);
     rare_differences_.of_large_size.push_back(all * large / difference_samples);

@@ -52,10 +52,11 @@ struct Score {
 // Gradient and differences of one parameter, from independent runs of at least two batches.
 class Residual {
  public:
-  // step: of the differences. jumps: whether the image of a sample may jump within it.
+  // step: of the differences. edges_move: whether any may: a sample's image is then
+  // discontinuous in the step.
   Residual(const Windows& windows, const GradientResult& gradient,
            const DifferenceEstimate& differences, const std::vector<double>& radiance, double step,
-           bool jumps);
+           bool edges_move);
 
   Score score(const Probe& probe) const;
   // Of each window alone; those without any variance and value are left out.

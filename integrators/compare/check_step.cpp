@@ -84,7 +84,7 @@ std::vector<std::vector<double>> steps_and_changes(size_t steps) {
 // shows; and elsewhere, where a few rare events may look like it. Not tuned.
 constexpr double kShows = 2, kShowsAlone = 10;
 
-// What a change between two steps tells about the bias of the larger one's differences.
+// What a change between two steps shows of the bias of the larger one's differences.
 struct Change {
   double whole;     // the bias over the change, if it grows with h^2
   double variance;  // of the change over that of the differences, for events at moving edges
@@ -154,7 +154,7 @@ double step_for_ratio(double step, double ratio) {
 
 double power_of_two_below(double step) { return std::exp2(std::floor(std::log2(step))); }
 
-// The step that a ladder tells, and whether a lower ladder may know better.
+// The step that a ladder finds, and whether a lower ladder may know better.
 struct Found {
   double step;
   bool below;

@@ -73,7 +73,7 @@ int Contours::sign(FaceRef face, const ContourPoint& at) const {
 }
 
 // A face to the left of its side, seen from the front, covers the side s . w < 0.
-int Contours::jump_of(EdgeRef id, const ContourPoint& at) const {
+int Contours::change_of(EdgeRef id, const ContourPoint& at) const {
   const EdgeMesh& mesh = input_.object(id.object);
   const Edge& edge = mesh.edge(id.edge);
   switch (edge.edge_class) {
@@ -87,14 +87,14 @@ int Contours::jump_of(EdgeRef id, const ContourPoint& at) const {
   }
   const Vec3d x0 = mesh.position(edge.vertices[0]);
   const Vec3d along = mesh.position(edge.vertices[1]) - x0;
-  int jump = 0;
+  int change = 0;
   for (const FaceRef face : mesh.faces_around(id.edge)) {
     const auto c = face_corners<double>(scene_.shape(face.shape).mesh, face.face);
     const Vec3d middle = (c[0] + c[1] + c[2]) * (1.0 / 3) - x0;
     const bool left = determinant(mesh.plane(face.face).n, along, middle) > 0;
-    jump += left ? -sign(face, at) : sign(face, at);
+    change += left ? -sign(face, at) : sign(face, at);
   }
-  return jump;
+  return change;
 }
 
 void Contours::list(const ContourPoint& at, const DirectionCone& cone, const ContourScreen* screen,
@@ -120,15 +120,15 @@ void Contours::list(const ContourPoint& at, const DirectionCone& cone, const Con
     double t0 = 0, t1 = 1;
     if (screen && !DirectionCone::clip_by(screen->height(edge.x0), screen->height(edge.x1), t0, t1))
       continue;
-    const int jump = jump_of(edge.id, at);
-    if (jump == 0) continue;
+    const int change = change_of(edge.id, at);
+    if (change == 0) continue;
     const Vec3d w0 = edge.x0 - at.p, w1 = edge.x1 - at.p;
-    arcs.push_back({t0 > 0 ? w0 + (w1 - w0) * t0 : w0, t1 < 1 ? w0 + (w1 - w0) * t1 : w1, jump});
+    arcs.push_back({t0 > 0 ? w0 + (w1 - w0) * t0 : w0, t1 < 1 ? w0 + (w1 - w0) * t1 : w1, change});
   }
   if (!screen) return;
   for (const ContourScreen::Cut& cut : screen->cuts) {
-    const int jump = -sign(cut.face, at);
-    if (jump != 0) arcs.push_back({cut.x0 - at.p, cut.x1 - at.p, jump});
+    const int change = -sign(cut.face, at);
+    if (change != 0) arcs.push_back({cut.x0 - at.p, cut.x1 - at.p, change});
   }
 }
 

@@ -26,11 +26,11 @@ struct ContourPoint {
   FaceRef face;  // that it lies on, if any
 };
 
-// A side that W changes across, as seen from p: by `jump` on the side s . w > 0, s = w0 x w1,
+// A side that W changes across, as seen from p: by `change` on the side s . w > 0, s = w0 x w1,
 // against the other.
 struct ContourArc {
   Vec3d w0, w1;  // its ends minus p
-  int jump;
+  int change;
 };
 
 // Faces of a scene that a polygon cuts: what lies before a flat emitter ends at its plane.
@@ -70,7 +70,7 @@ class Contours {
 
  private:
   int sign(FaceRef face, const ContourPoint& at) const;
-  int jump_of(EdgeRef id, const ContourPoint& at) const;
+  int change_of(EdgeRef id, const ContourPoint& at) const;
 
   const Scene& scene_;
   const RayTracer& tracer_;

@@ -118,7 +118,7 @@ void Isolines::cross(const ContourArc& arc, double turn0, double turn1, const Co
   }
   if (way == 0) return;
   // What starts outward on the side s . pole > 0 ends on the other.
-  const int change = way > 0 ? -arc.jump : arc.jump;
+  const int change = way > 0 ? -arc.change : arc.change;
   const double from = way > 0 ? turn0 : turn1, to = way > 0 ? turn1 : turn0;
   const double first = in_lines(from), last = in_lines(to) + (to < from ? count : 0);
   if (std::floor(first) + 1 > last) return;

@@ -4,7 +4,7 @@
 //   w(theta) = pole cos theta + r sin theta,   r of unit length, across the pole,
 //
 // at N azimuths. On each of them W (contours.h) starts as it is at the pole and changes by a known
-// number at every crossing; the sky is open where it is zero. Places on a line are told by
+// number at every crossing; the sky is open where it is zero. Places on a line are given by
 // cot theta = (pole . w) / (r . w), which falls from infinity to -infinity and needs no root.
 #include <cmath>
 #include <cstdint>

@@ -20,7 +20,7 @@ constexpr int kSkyLines = 4;
 // Emitters that are no polygon are cut into their faces. Not tuned.
 constexpr size_t kMostFaces = 64;
 
-// Few lines can miss the same thing and agree: a tolerance asks for as many at least. Of a cube
+// Few lines can miss the same thing and agree: a tolerance needs as many at least. Of a cube
 // that fills a tenth of the azimuths the largest error of 100 offsets at a tolerance of 1e-3 is
 // 0.13 from one line, and 1.1e-3 from 8 (test_line_light).
 constexpr int kFewestLines = 8;

@@ -42,7 +42,7 @@ struct LineWork {
 class LineLight {
  public:
   // The scene and its tracer must outlive it. direct: whether emitters() and environment() are to
-  // be asked; InputError where check() says so, and for emitters that lie in one place. sky: what
+  // be called; InputError where check() says so, and for emitters that lie in one place. sky: what
   // environment() is to integrate, the scene's own or a part of it; none: nothing.
   LineLight(const Scene& scene, const RayTracer& tracer, int threads, const LineOptions& options,
             bool direct, std::shared_ptr<const Environment> sky);

@@ -45,7 +45,8 @@ RadianceColumns::RadianceColumns(const Environment& environment, int threads)
   });
 }
 
-// At the poles radiance depends on the azimuth of approach: a direction next to it tells.
+// At the poles radiance depends on the azimuth of approach: it is taken from a direction next to
+// it.
 Vec3d RadianceColumns::direction(int column, int row) const {
   const double phi = 2 * kPi * (column + 0.5) / grid_.columns;
   const double theta = std::clamp(step_ * row, 1e-7, kPi - 1e-7);

@@ -7,7 +7,7 @@
 #include <map>
 #include <set>
 
-#include "integrators/edges/texture_jumps.h"
+#include "integrators/edges/texture_discontinuities.h"
 #include "limn/core/duplicate_faces.h"
 #include "limn/core/lights.h"
 #include "limn/core/names.h"
@@ -50,7 +50,7 @@ bool is_black_behind(const Shape& shape) { return shape.bsdf->side(false) == nul
 EdgeSamplerInput make_scene_edges(const Scene& scene, int threads) {
   EdgeSamplerInput input;
   std::vector<const Mesh*> meshes;
-  const TextureJumps textures(scene);
+  const TextureDiscontinuities textures(scene);
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
     const Shape& shape = scene.shapes[s];
     input.objects.push_back(build_edge_mesh(shape.mesh, is_black_behind(shape), ShapeId(s),
@@ -136,9 +136,9 @@ void warn_of_contacts(const Scene& scene, const EdgeSamplerInput* edges,
         pair_in_text(scene, pair)));
   }
   constexpr size_t kMost = 8;
-  size_t told = 0;
+  size_t reported = 0;
   for (const ShapePair& pair : edges->parting) {
-    if (pressed.count(pair) || ++told > kMost) continue;
+    if (pressed.count(pair) || ++reported > kMost) continue;
     warn(fmt::format(
         "{} touch along an edge and move apart or through each other: there the image has a kink, "
         "and the derivative is that beside a hair's gap between them, which may be the slope of "
@@ -146,8 +146,8 @@ void warn_of_contacts(const Scene& scene, const EdgeSamplerInput* edges,
         "is no kink",
         pair_in_text(scene, pair)));
   }
-  if (told > kMost)
-    warn(fmt::format("{} more pairs of shapes touch and part like that", told - kMost));
+  if (reported > kMost)
+    warn(fmt::format("{} more pairs of shapes touch and part like that", reported - kMost));
 }
 
 }  // namespace limn

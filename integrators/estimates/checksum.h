@@ -5,7 +5,7 @@
 
 namespace limn {
 
-// CRC-32 of bytes, as in PNG and zlib (ISO 3309): it tells of every flipped bit.
+// CRC-32 of bytes, as in PNG and zlib (ISO 3309): it detects every flipped bit.
 inline uint32_t checksum(std::string_view bytes) {
   static constexpr auto kTable = [] {
     std::array<uint32_t, 256> table{};

@@ -1,4 +1,4 @@
-// What tells scenes apart.
+// What distinguishes scenes.
 #include <fmt/format.h>
 
 #include <bit>

@@ -186,9 +186,10 @@ void PartFile::read_text() {
     throw InputError({name_}, "was written by another version of limn: make the part again");
   }
   if (line != kTitle) fail();
-  const size_t told = text.rfind(kSum);
-  if (told == std::string::npos ||
-      text.substr(told) != fmt::format("{}{:08x}\n", kSum, checksum(text.substr(0, told)))) {
+  const size_t sum_begin = text.rfind(kSum);
+  if (sum_begin == std::string::npos ||
+      text.substr(sum_begin) !=
+          fmt::format("{}{:08x}\n", kSum, checksum(text.substr(0, sum_begin)))) {
     throw InputError({name_}, "is damaged at its beginning: make this part again");
   }
   while (std::getline(lines, line) && !line.starts_with(kSum)) {

@@ -1,4 +1,4 @@
-// The peak of resident memory, as Linux tells it.
+// The peak of resident memory, as Linux reports it.
 #include "integrators/estimates/peak_memory.h"
 
 #include <fstream>

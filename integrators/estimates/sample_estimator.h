@@ -63,10 +63,10 @@ inline FilmMotion tapered(const FilmMotion& motion, const Film& film, int px, in
 // Of a pixel of the full film; null where its positions are held.
 using FilmMotionAt = std::function<const FilmMotion*(int x, int y)>;
 
-// A point on a curve of the film across which radiance jumps.
+// A point on a curve of the film across which radiance is discontinuous.
 struct FilmSample {
   double x, y;       // film position [pixels]
-  Rgb<Lanes> value;  // jump times normal speed of the curve [pixels per unit of the parameter],
+  Rgb<Lanes> value;  // difference times the curve's normal speed [pixels per unit of parameter],
                      // over the density of the sample [1 / pixel of length]
   // The same of a curve that moves by a pixel along x, or y, against the positions of samples.
   Rgb<double> along_x{}, along_y{};
@@ -183,7 +183,7 @@ class SampleEstimator {
   virtual double film_samples(size_t /*slot*/) const { return 0; }
   // How the positions of a pixel's samples on the film move; null if they are held.
   virtual const FilmMotion* film_motion(int /*x*/, int /*y*/) const { return nullptr; }
-  // Tells the streams of different slots apart.
+  // Distinguishes the streams of different slots.
   virtual int film_stream(size_t /*slot*/) const { return 0; }
   virtual bool sample_film(size_t /*slot*/, double /*u*/, const Rng& /*key*/, RayCount& /*rays*/,
                            FilmSample& /*sample*/) const {

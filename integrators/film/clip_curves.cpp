@@ -58,7 +58,7 @@ std::vector<ClipSegment> find_clip_segments(const Scene& scene) {
 }
 
 bool clip_difference(const PathContext& context, const ClipSegment& segment, const Vec3d& from,
-                     const Vec3d& y, const Rng& key, RayCount& rays, Rgb<double>& jump) {
+                     const Vec3d& y, const Rng& key, RayCount& rays, Rgb<double>& difference) {
   const Scene& scene = context.scene;
   const double distance = length(y - from);
   Ray ray{from, (y - from) / distance};
@@ -83,7 +83,7 @@ bool clip_difference(const PathContext& context, const ClipSegment& segment, con
     path.follow_one(walk);
     return walk.radiance();
   };
-  jump = (found ? leaving(hit.face) : path.escaped(ray.direction, 0)) - leaving(segment.face);
+  difference = (found ? leaving(hit.face) : path.escaped(ray.direction, 0)) - leaving(segment.face);
   return true;
 }
 

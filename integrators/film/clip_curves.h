@@ -1,5 +1,5 @@
 #pragma once
-// Curves along which the camera's clip planes cut faces: what is seen jumps across them, and they
+// Curves along which the camera's clip planes cut faces: radiance is discontinuous there, and they
 // move with the camera and with the faces.
 #include <array>
 #include <vector>
@@ -22,6 +22,6 @@ std::vector<ClipSegment> find_clip_segments(const Scene& scene);
 // point `y` of the segment, minus that where the face is seen. from: where the camera's ray to y
 // starts. False if y is hidden.
 bool clip_difference(const PathContext& context, const ClipSegment& segment, const Vec3d& from,
-                     const Vec3d& y, const Rng& key, RayCount& rays, Rgb<double>& jump);
+                     const Vec3d& y, const Rng& key, RayCount& rays, Rgb<double>& difference);
 
 }  // namespace limn

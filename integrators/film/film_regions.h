@@ -29,7 +29,7 @@ class FilmRegions {
   struct SeenPart {
     double from, to;
     // What is seen beside it that is none of the edge's faces: a face, or FaceRef{} where nothing
-    // is, or where the edge has a face of its own on either side. None if that cannot be told:
+    // is, or where the edge has a face of its own on either side. None if that is not resolved:
     // within a millionth of a pixel more than one other thing is seen.
     std::optional<FaceRef> beside;
   };

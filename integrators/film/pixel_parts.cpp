@@ -18,7 +18,7 @@ constexpr double kFar = 0.25;
 
 // Below this area [pixels^2] a centroid is rounding. What lies on a border has no area but sides
 // that sweep one: it is taken for kNoArea, far below rounding, with the middle of its box for a
-// centroid, whose motion tells, to first order, the light where the sides are. Not tuned.
+// centroid, whose motion gives, to first order, the light where the sides are. Not tuned.
 constexpr double kLeastArea = 0x1p-40, kNoArea = 0x1p-56;
 
 // Of what the middle of a side adds, by how many steps of the grid it lies within the window: half

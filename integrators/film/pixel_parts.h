@@ -10,9 +10,9 @@
 // Wu, Ramamoorthi, Yan 2021, with lines in place of corners.
 //
 // A line on the border of two pixels moves into one or the other, and the area that it sweeps is
-// this one's alone: each pixel has a kink there, their sum has none. What is told is the mean of
-// both sides, half in each pixel. So regions are found a step of the grid beyond the pixel, where
-// such a line is inside of both, and are cut by the pixel's own border where they are summed.
+// this one's alone: each pixel has a kink there, their sum has none. What is returned is the mean
+// of both sides, half in each pixel. So regions are found a step of the grid beyond the pixel,
+// where such a line is inside of both, and are cut by the pixel's own border where they are summed.
 #include <vector>
 
 #include "integrators/film/pixel_regions.h"
@@ -40,7 +40,7 @@ class PixelParts {
       : scene_(scene), pixels_(pixels), view_(scene.camera), plane_(view_.plane(0, 0)) {}
 
   // Finds the parts in the pixel (x, y), in the order of labels. moving: whether derivatives will
-  // be asked for.
+  // be evaluated.
   void find(int x, int y, const VisibleRegions& regions, bool moving);
   size_t size() const { return parts_.size(); }
 

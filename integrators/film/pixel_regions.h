@@ -15,7 +15,7 @@
 
 namespace limn {
 
-// Who asks, for messages: "the exact film", and what takes every film: "--film rays".
+// Who needs them, for messages: "the exact film", and what takes every film: "--film rays".
 struct RegionsUser {
   const char *name, *instead;
   double margin = 0;  // by which a pixel's regions reach beyond it on all sides [pixels]

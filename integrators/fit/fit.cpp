@@ -212,7 +212,7 @@ void Fit::Impl::check_terms() const {
   }
 }
 
-// What would fail after hours is told at once.
+// What would fail after hours is reported at once.
 void Fit::Impl::check_remeshing() {
   bool any = false;
   for (const FitParameter& p : parameters_) {
@@ -276,7 +276,7 @@ bool Fit::Impl::add_view(size_t view, FitRecord& record,
   BackwardOptions backward_options = options_.backward;
   // Nobody asks for standard errors, and each batch ends with the adjoint of normals.
   backward_options.batches = 1;
-  backward_options.find_gaps = false;  // told before the first step
+  backward_options.find_gaps = false;  // reported before the first step
   if (is_exact()) backward_options.uniform_pixels = true;
   // Those of the fit: what shapes turn about is taken along by its translations, and does not
   // wander.

@@ -36,7 +36,8 @@ void Fit::Impl::check_exact() {
     if (!moves_on_film(v)) continue;
     warnings.push_back(
         "what is fitted moves silhouettes that the camera sees: a film sample that one of them "
-        "passes makes the loss jump, by its share of a pixel; with many samples per pixel the "
+        "passes makes the loss discontinuous, by its share of a pixel; with many samples per pixel "
+        "the "
         "steps of lbfgs get over that");
     if (camera) {
       warnings.back() +=

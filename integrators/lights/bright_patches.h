@@ -31,7 +31,7 @@ struct BrightPatch {
 // is such a part by itself. No two hold the same direction. Found among directions that the
 // environment itself draws, the same each time.
 std::vector<BrightPatch> find_bright_patches(const Environment& environment);
-// Whether there is any: that asks for less work.
+// Whether there is any: that takes less work.
 bool has_bright_patch(const Environment& environment);
 
 }  // namespace limn

@@ -10,8 +10,8 @@
 namespace limn {
 namespace {
 
-// Planes of an emitter are told apart beyond so many roundings of its coordinates to floats. Not
-// tuned.
+// Planes of an emitter count as different beyond so many roundings of its coordinates to floats.
+// Not tuned.
 constexpr double kRoundings = 8 * 0x1p-24;
 constexpr const char* kInstead = "use another method (render: path)";
 

@@ -456,8 +456,8 @@ class ClosedLight::View {
   Scratch& scratch_;
 };
 
-// What the point sees of the emitter, in the scratch; as it is there if the same was asked for
-// last.
+// What the point sees of the emitter, in the scratch; as it is there if the last call was for the
+// same.
 void ClosedLight::find(const EmitterPlane& emitter, const Receiver& receiver, Scratch& scratch,
                        Turns& turns) const {
   Scratch::Found& last = scratch.last;

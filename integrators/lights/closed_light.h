@@ -37,7 +37,7 @@ class ClosedLight {
   enum class By { kOutlines, kRegions };
   ClosedLight(const Scene& scene, int threads, By by = By::kOutlines);
   // Of the same scene with other tangents: what is where is known already. A point that one of both
-  // was asked for last costs the other little.
+  // evaluated last costs the other little.
   ClosedLight(const Scene& scene, const ClosedLight& same);
 
   static constexpr size_t kMostPlanes = 64;  // of one emitter

@@ -23,8 +23,8 @@ struct ClosedLight::Receiver {
 // Which way round faces are seen, while outlines are found: as large as the tree, so there is one
 // for all emitters.
 struct ClosedLight::Turns {
-  // Of each item of the tree twice the query that last told it, and one more if it is seen from
-  // behind.
+  // Of each item of the tree twice the query that last evaluated it, and one more if it is seen
+  // from behind.
   std::vector<uint64_t> of;
   uint64_t query = 0;
 };

@@ -10,7 +10,7 @@
 namespace limn {
 namespace {
 
-// Emitters of more faces are not asked whether p is behind all of them. Not tuned.
+// Emitters of more faces are not tested for whether p is behind all of them. Not tuned.
 constexpr size_t kFewFaces = 16;
 // Emitters of more corners are taken for the box around them. Not tuned.
 constexpr size_t kFewCorners = 64;

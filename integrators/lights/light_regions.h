@@ -1,8 +1,8 @@
 #pragma once
-// What is emitted, split into regions of few directions each, and the rest. The jump of radiance
-// across an edge is linear in radiance: dL = sum over regions of dL_k + dL_rest, dL_k being the
-// jump of what region k emits and p sees directly. All scattered light belongs to the rest. Each
-// part has an estimator of its own: direct_boundary.cpp lists the silhouettes before a region.
+// What is emitted, split into regions of few directions each, and the rest. The difference of
+// radiance across an edge is linear in it: dL = sum over regions of dL_k + dL_rest, dL_k being that
+// of what region k emits and p sees directly. All scattered light belongs to the rest. Each part
+// has an estimator of its own: direct_boundary.cpp lists the silhouettes before a region.
 #include <optional>
 #include <vector>
 

@@ -21,7 +21,7 @@ constexpr double kLeastHeight = 1e-3;
 // teapot under two emitters on gloss were listed where it does not pay, and the squared error times
 // time was 9 times as large (5 seeds; without the noisiest hundredth 1.6 times).
 constexpr double kLit = 1.5;
-// Of a shape, where it is asked what emitters send there; of few faces each has several.
+// Of a shape, where what emitters send there is estimated; of few faces each has several.
 constexpr size_t kPairs = 32;
 constexpr double kApart = 0.1;  // two of a pair, over an edge
 // What is rounding of a point in the plane, over the flat part's radius.
@@ -38,9 +38,9 @@ std::array<Vec3d, 2> across(const Vec3d& n) {
   return {a, cross(n, a)};
 }
 
-// Where a far light's glare looks the same from, over the height of the point, which is the origin.
-Vec3d start_of(const MirroredLight::Glare& glare) {
-  return glare.toward * ((1 - glare.nearness) / -dot(glare.toward, glare.normal));
+// Where a far light's highlight looks the same from, over the height of the point, the origin.
+Vec3d start_of(const MirroredLight::Highlight& highlight) {
+  return highlight.toward * ((1 - highlight.nearness) / -dot(highlight.toward, highlight.normal));
 }
 
 // 1 - cos(angle).
@@ -243,98 +243,101 @@ void MirroredLight::add(const FlatPart& part, const Bsdf& bsdf, const Vec3d& nor
 // nearer point: where w meets the plane, the half vector turns with w as seen from p and as seen
 // from the emitter, at the distances a and b, together as for a far light at the distance
 // a b / (a + b).
-bool MirroredLight::sees(const Image& image, const Vec3d& p, Glare& glare) const {
+bool MirroredLight::sees(const Image& image, const Vec3d& p, Highlight& highlight) const {
   const Vec3d& n = image.normal;
   const double height = dot(p - image.center, n);
   if (!(height > kInPlane * image.radius)) return false;
   double size = image.size;  // of the light, as the angle that its mirror image has from p
   if (image.infinite) {
-    glare.light = image.light;
-    glare.nearness = 1;
-    glare.toward = image.light - n * (2 * dot(image.light, n));
+    highlight.light = image.light;
+    highlight.nearness = 1;
+    highlight.toward = image.light - n * (2 * dot(image.light, n));
   } else {
     const double emitter_height = dot(image.light - image.center, n);
     const Vec3d to = image.light - n * (2 * emitter_height) - p;
     const double distance = length(to);
-    glare.toward = to / distance;
-    glare.light = glare.toward - n * (2 * dot(glare.toward, n));
-    glare.nearness = emitter_height / (emitter_height + height);
+    highlight.toward = to / distance;
+    highlight.light = highlight.toward - n * (2 * dot(highlight.toward, n));
+    highlight.nearness = emitter_height / (emitter_height + height);
     size /= distance;
   }
   // A half vector that turns turns what is mirrored twice as far.
-  const double lobe = 2 * image.width * glare.nearness;
+  const double lobe = 2 * image.width * highlight.nearness;
   const double spread = spread_of(lobe, size);
   const auto hit_of = [&](const Vec3d& w) { return p + w * (height / -dot(w, n)); };
-  const Vec3d shown = hit_of(glare.toward);
+  const Vec3d shown = hit_of(highlight.toward);
   const auto is_inside = [&](const Vec3d& x) { return length(x - image.center) <= image.radius; };
   if (!is_inside(shown)) {
     // The steepest direction in which it is still bright.
-    const double sine = -dot(glare.toward, n);
+    const double sine = -dot(highlight.toward, n);
     const double turn = image.infinite ? image.turn : std::sin(spread);
     const double rest = image.infinite ? image.rest : std::cos(spread);
-    const Vec3d along = glare.toward + n * sine;
+    const Vec3d along = highlight.toward + n * sine;
     const double cosine = length(along);
     const double level = cosine * rest - sine * turn;
     const Vec3d steep =
         level > 0 ? along * (level / cosine) - n * (sine * rest + cosine * turn) : -n;
     if (!is_inside(hit_of(steep))) return false;
   }
-  glare.bsdf = image.bsdf;
-  glare.normal = n;
-  glare.depth = height + kFlat * image.radius;
-  glare.half_angle = 2 * lobe + size;
+  highlight.bsdf = image.bsdf;
+  highlight.normal = n;
+  highlight.depth = height + kFlat * image.radius;
+  highlight.half_angle = 2 * lobe + size;
   // Where the light is wider than the lobe, its image is about as wide as the light.
-  glare.cone = lobe < 2 * size ? versine(std::max(spread, kLeastCone)) : 0;
-  glare.irradiance = image.albedo * glare.nearness * glare.nearness *
-                     (image.emitter ? lights_.estimate(*image.emitter, shown) : image.irradiance);
+  highlight.cone = lobe < 2 * size ? versine(std::max(spread, kLeastCone)) : 0;
+  highlight.irradiance =
+      image.albedo * highlight.nearness * highlight.nearness *
+      (image.emitter ? lights_.estimate(*image.emitter, shown) : image.irradiance);
   return true;
 }
 
 // The cosine of the half vector, as the microfacets have it that mirror the light, see pdf().
-double MirroredLight::alignment(const Glare& glare, const Vec3d& w) {
-  if (glare.cone > 0) return dot(w, glare.toward);
-  const double cosine = -dot(w, glare.normal);
+double MirroredLight::alignment(const Highlight& highlight, const Vec3d& w) {
+  if (highlight.cone > 0) return dot(w, highlight.toward);
+  const double cosine = -dot(w, highlight.normal);
   if (!(cosine > 0)) return -1;
-  const Vec3d half = glare.light + normalize(start_of(glare) - w / cosine);
-  return dot(half, glare.normal) / length(half);
+  const Vec3d half = highlight.light + normalize(start_of(highlight) - w / cosine);
+  return dot(half, highlight.normal) / length(half);
 }
 
 // From a point over the plane by `nearness` in place of 1 in the same line of sight, the light is
 // scattered as that of a far one; then the solid angle is that at the point itself.
-double MirroredLight::pdf(const Glare& glare, const Vec3d& w) {
-  if (glare.cone > 0) {
-    return length_squared(w - glare.toward) <= 2 * glare.cone ? 1 / (2 * kPi * glare.cone) : 0;
+double MirroredLight::pdf(const Highlight& highlight, const Vec3d& w) {
+  if (highlight.cone > 0) {
+    return length_squared(w - highlight.toward) <= 2 * highlight.cone
+               ? 1 / (2 * kPi * highlight.cone)
+               : 0;
   }
-  const double cosine = -dot(w, glare.normal);
+  const double cosine = -dot(w, highlight.normal);
   if (!(cosine > 0)) return 0;
-  const Vec3d x = w / cosine, from = start_of(glare), d = x - from;
+  const Vec3d x = w / cosine, from = start_of(highlight), d = x - from;
   const double l = length(d), ratio = 1 / (cosine * l);
-  return glare.nearness * ratio * ratio * ratio *
-         glare.bsdf->pdf_solid_angle(glare.normal, glare.light, d / -l);
+  return highlight.nearness * ratio * ratio * ratio *
+         highlight.bsdf->pdf_solid_angle(highlight.normal, highlight.light, d / -l);
 }
 
 double MirroredLight::pdf(const Mixture& mixture, const Vec3d& w, double scattered) {
   if (mixture.share == 0) return scattered;
   double sum = 0;
-  for (int i = 0; i < mixture.count; ++i) sum += mixture.part[i] * pdf(mixture.glare(i), w);
+  for (int i = 0; i < mixture.count; ++i) sum += mixture.part[i] * pdf(mixture.highlight(i), w);
   return mixture.rough * mixture.share * sum + (1 - mixture.share) * scattered;
 }
 
 std::optional<Vec3d> MirroredLight::sample(const Mixture& mixture, double u, double u1, double u2) {
   int i = 0;
   while (i + 1 < mixture.count && u >= mixture.part[i]) u -= mixture.part[i++];
-  const Glare& glare = mixture.glare(i);
-  if (glare.cone > 0) {
-    const double rise = u1 * glare.cone, sine = std::sqrt(rise * (2 - rise));
-    const auto [a, b] = across(glare.toward);
-    return glare.toward * (1 - rise) + a * (sine * std::cos(2 * kPi * u2)) +
+  const Highlight& highlight = mixture.highlight(i);
+  if (highlight.cone > 0) {
+    const double rise = u1 * highlight.cone, sine = std::sqrt(rise * (2 - rise));
+    const auto [a, b] = across(highlight.toward);
+    return highlight.toward * (1 - rise) + a * (sine * std::cos(2 * kPi * u2)) +
            b * (sine * std::sin(2 * kPi * u2));
   }
-  const auto scattered = glare.bsdf->sample(glare.normal, glare.light, u1, u2);
+  const auto scattered = highlight.bsdf->sample(highlight.normal, highlight.light, u1, u2);
   if (!scattered) return {};
-  const double height = dot(*scattered, glare.normal);
+  const double height = dot(*scattered, highlight.normal);
   if (!(height > 0)) return {};
-  return normalize(start_of(glare) - *scattered * (glare.nearness / height));
+  return normalize(start_of(highlight) - *scattered * (highlight.nearness / height));
 }
 
 }  // namespace limn

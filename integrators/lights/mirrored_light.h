@@ -1,11 +1,12 @@
 #pragma once
-// Small bright lights as flat glossy surfaces show them. A diffuse point sees the glare of the sun,
-// or of an emitter, on a glossy floor within a few degrees; its own scattering finds these once in
-// a hundred samples, and each is then a hundred times as bright as the rest: they ruled the squared
-// error of whole images. Scattering functions are reciprocal, so the directions of the glare are
-// those into which the floor scatters the light; where it is far away they are the same from all
-// points, and a near emitter is seen as a far one would be from a nearer point. So a share of a
-// vertex's directions is drawn from there: a mixture of densities, which changes no mean.
+// Small bright lights as flat glossy surfaces show them. A diffuse point sees the highlight of the
+// sun, or of an emitter, on a glossy floor within a few degrees; its own scattering finds these
+// once in a hundred samples, and each is then a hundred times as bright as the rest: they ruled the
+// squared error of whole images. Scattering functions are reciprocal, so the directions of the
+// highlight are those into which the floor scatters the light; where it is far away they are the
+// same from all points, and a near emitter is seen as a far one would be from a nearer point. So a
+// share of a vertex's directions is drawn from there: a mixture of densities, which changes no
+// mean.
 #include <algorithm>
 #include <array>
 #include <bitset>
@@ -28,19 +29,19 @@ namespace limn {
 class MirroredLight {
  public:
   static constexpr size_t kMostImages = 4;  // not tuned
-  // A light in a flat part of a surface, as one point sees it.
-  struct Glare {
-    const Bsdf* bsdf;   // of the surface
-    Vec3d normal;       // unit, of its lit side
-    Vec3d light;        // unit, from where a perfect mirror would show it towards the light
-    Vec3d toward;       // unit, from the point to there
-    double depth;       // that what lies behind the surface's plane has from the point, along it
-    double nearness;    // how far a far light's glare would be seen from, over the distance there
+  // The specular reflection of a light in a flat part of a surface, as one point sees it.
+  struct Highlight {
+    const Bsdf* bsdf;  // of the surface
+    Vec3d normal;      // unit, of its lit side
+    Vec3d light;       // unit, from where a perfect mirror would show it towards the light
+    Vec3d toward;      // unit, from the point to there
+    double depth;      // that what lies behind the surface's plane has from the point, along it
+    double nearness;  // how far a far light's highlight would be seen from, over the distance there
     double half_angle;  // of the cap of directions that holds most of it [rad]
     double cone;        // 1 - the cosine of the angle of directions that are uniform; 0: others are
     double irradiance;  // of its light at the point, across it, without what hides it
   };
-  // The part that a vertex takes of its directions from each glare.
+  // The part that a vertex takes of its directions from each highlight.
   struct Mixture {
     Mixture() {}           // NOLINT: a path has hundreds of bytes here that are hardly ever used
     double share = 0;      // of all together; 0: from the scattering function alone
@@ -49,16 +50,18 @@ class MirroredLight {
     int count = 0;
     std::array<double, kMostImages> part;  // sum to 1
 
-    Glare& glare(int i) { return std::launder(reinterpret_cast<Glare*>(glares_))[i]; }
-    const Glare& glare(int i) const {
-      return std::launder(reinterpret_cast<const Glare*>(glares_))[i];
+    Highlight& highlight(int i) {
+      return std::launder(reinterpret_cast<Highlight*>(highlights_))[i];
+    }
+    const Highlight& highlight(int i) const {
+      return std::launder(reinterpret_cast<const Highlight*>(highlights_))[i];
     }
 
    private:
     // In bytes such objects live as soon as they are written to: what there is none of is not
     // filled.
-    static_assert(std::is_aggregate_v<Glare> && std::is_trivially_copyable_v<Glare>);
-    alignas(Glare) std::byte glares_[kMostImages * sizeof(Glare)];
+    static_assert(std::is_aggregate_v<Highlight> && std::is_trivially_copyable_v<Highlight>);
+    alignas(Highlight) std::byte highlights_[kMostImages * sizeof(Highlight)];
   };
 
   // Both must outlive it. Null where the scene has no such light or surface.
@@ -72,13 +75,14 @@ class MirroredLight {
     double sum = 0, of_emitters = 0;
     const Bsdf& bsdf = *scene_.shape(surface.face.shape).bsdf->side(scattering.front());
     for (const Image& image : images_) {
-      Glare& glare = mixture.glare(mixture.count);
-      if (image.holds(surface.face) || !sees(image, value(surface.p), glare)) continue;
-      const double power = luminance(scattering.eval_value(bsdf, glare.toward)) * glare.irradiance;
+      Highlight& highlight = mixture.highlight(mixture.count);
+      if (image.holds(surface.face) || !sees(image, value(surface.p), highlight)) continue;
+      const double power =
+          luminance(scattering.eval_value(bsdf, highlight.toward)) * highlight.irradiance;
       if (!(power > 0)) continue;
       mixture.part[mixture.count++] = power;
       sum += power;
-      if (image.emitter) of_emitters += glare.irradiance;
+      if (image.emitter) of_emitters += highlight.irradiance;
     }
     if (!(sum > 0)) return mixture;
     for (int i = 0; i < mixture.count; ++i) mixture.part[i] /= sum;
@@ -91,11 +95,11 @@ class MirroredLight {
   // The density at the unit direction w [1/sr], of which scattering alone has this one there; both
   // integrate to mixture.rough.
   static double pdf(const Mixture& mixture, const Vec3d& w, double scattered);
-  // Of directions of one glare.
-  static double pdf(const Glare& glare, const Vec3d& w);
-  // Greater where the glare is brighter: along an edge, its brightest point has the most.
-  static double alignment(const Glare& glare, const Vec3d& w);
-  // A direction of the glares, from three numbers in [0, 1).
+  // Of directions of one highlight.
+  static double pdf(const Highlight& highlight, const Vec3d& w);
+  // Greater where the highlight is brighter: along an edge, its brightest point has the most.
+  static double alignment(const Highlight& highlight, const Vec3d& w);
+  // A direction of the highlights, from three numbers in [0, 1).
   static std::optional<Vec3d> sample(const Mixture& mixture, double u, double u1, double u2);
 
  private:
@@ -127,7 +131,7 @@ class MirroredLight {
   std::vector<Image> find_lights(const Scene& scene);
   void add(const FlatPart& part, const Bsdf& bsdf, const Vec3d& normal, const Image& source);
   static std::vector<FlatPart> flat_parts(const Mesh& mesh, ShapeId shape);
-  bool sees(const Image& image, const Vec3d& p, Glare& glare) const;
+  bool sees(const Image& image, const Vec3d& p, Highlight& highlight) const;
 
   const Scene& scene_;
   const Lights& lights_;

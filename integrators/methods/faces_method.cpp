@@ -48,8 +48,8 @@ std::vector<std::string> trace_faces(const Scene& scene, const GradientOptions& 
 }
 
 GradientResult run_faces(const Scene& scene, const GradientOptions& options,
-                         const RunSettings& asked) {
-  const RunSettings settings = settings_for(FilmPoints::kFaces, asked);
+                         const RunSettings& requested) {
+  const RunSettings settings = settings_for(FilmPoints::kFaces, requested);
   const Stopwatch watch;
   selected_terms({kFacesTerm}, options.terms, scene.file);
   if (options.exact_film) {

@@ -27,8 +27,8 @@ constexpr double kLeastPart = 1.0 / 16;
 // Faces with a longest side below this many widths of such a gap are passed over: their gap is no
 // longer than wide. Not tuned.
 constexpr double kLeastSide = 16;
-// Within one shape a gap is told where it is this long [pixels]: creases of scanned meshes, whose
-// edges are shorter, would be told of in most of them. Not tuned.
+// Within one shape a gap is reported where it is this long [pixels]: creases of scanned meshes,
+// whose edges are shorter, would be reported in most of them. Not tuned.
 constexpr double kLeastLength = 1;
 // Of the tree, that one thread takes at a time. Not tuned.
 constexpr size_t kLeaves = 256;
@@ -259,7 +259,7 @@ class GapFinder {
   double pixel_ = 0;  // of the film, at a distance of 1; of parallel rays at any
   std::vector<FaceRef> faces_;
   std::vector<FloatBox> boxes_;
-  // Of each shape that is asked for: see closed_faces.
+  // Of each shape that closed_faces() was called for.
   mutable std::vector<std::once_flag> once_;
   mutable std::vector<std::vector<bool>> closed_;
   Gaps gaps_;
@@ -272,9 +272,9 @@ void warn_of_hair_gaps(const Scene& scene, double spp, int threads,
   if (!(spp >= 1)) return;
   const GapFinder finder(scene, spp, threads);
   constexpr size_t kMost = 8;
-  size_t told = 0;
+  size_t reported = 0;
   for (const auto& [shapes, gap] : finder.gaps()) {
-    if (++told > kMost) break;
+    if (++reported > kMost) break;
     warnings.push_back(fmt::format(
         "{} a gap of {:.2g} between {}, {:.2g} of a pixel, which {:.0f} samples per pixel can "
         "miss: derivatives there may be off by more than their errors say; close the gap, or take "

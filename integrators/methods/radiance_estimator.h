@@ -52,7 +52,7 @@ class RadianceEstimator final : public SharingEstimator {
   std::shared_ptr<const FilmRegions> visible_;
   Numbers numbers_;
   bool glossy_;
-  // Errors of neighbours depend on each other where samples are shared, which no variance tells:
+  // Errors of neighbours depend on each other where samples are shared, which no variance shows:
   // so it is where these are no errors anyway.
   int reach_ = 0;
 };

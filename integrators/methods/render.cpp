@@ -151,13 +151,14 @@ RenderResult run(const Scene& scene, const EstimatorList& estimators, const RunS
 
 }  // namespace
 
-RenderResult render(const Scene& scene, const RunSettings& asked, const RenderOptions& options) {
+RenderResult render(const Scene& scene, const RunSettings& requested,
+                    const RenderOptions& options) {
   check_options(options);
   if (options.what == RenderWhat::kDirect) {
-    return render(with_direct_light_alone(scene), asked, of_radiance(options));
+    return render(with_direct_light_alone(scene), requested, of_radiance(options));
   }
   const Stopwatch watch;
-  const RunSettings settings = settings_for(options.points, asked);
+  const RunSettings settings = settings_for(options.points, requested);
   check_task(options.method, Task::kImage);
   check_blur(options.blur, {options.method});
   if (settings.store) identify(*settings.store, options);

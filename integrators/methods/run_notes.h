@@ -1,5 +1,5 @@
 #pragma once
-// What a run tells of itself among GradientResult::settings.
+// What a run reports of itself among GradientResult::settings.
 #include <fmt/format.h>
 
 #include <algorithm>

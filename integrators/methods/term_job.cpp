@@ -9,7 +9,7 @@
 #include <numeric>
 
 #include "integrators/edges/scene_edges.h"
-#include "integrators/edges/texture_jumps.h"
+#include "integrators/edges/texture_discontinuities.h"
 #include "integrators/estimates/batches.h"
 #include "integrators/film/film_regions.h"
 #include "integrators/methods/run_notes.h"
@@ -186,18 +186,18 @@ class TermJob {
     result.incomplete = !missing.empty();
     if (result.incomplete) result.warnings.push_back(missing);
     if (moved_.any()) check_texture_edges(scene_, result.warnings);
-    bool told = false;
+    bool reported = false;
     for (size_t p = 0; p < passes_.size(); ++p) {
       const Viewpoints* viewpoints = pass(p).viewpoints();
       if (!viewpoints) continue;
-      if (!told) warn_of_faces_edge_on(scene_, *viewpoints, result.warnings);
-      told = true;
+      if (!reported) warn_of_faces_edge_on(scene_, *viewpoints, result.warnings);
+      reported = true;
       result.at_kink = result.at_kink || viewpoints->cross_planes();
     }
   }
 
-  // What moving directions change in one term they take back in the others, and at every jump of
-  // radiance there must be an edge: of what smooth lobes show there may be none.
+  // What moving directions change in one term they take back in the others, and at every
+  // discontinuity of radiance there must be an edge: of what smooth lobes show there may be none.
   bool has_all_edges() const {
     if (!has_all_edges_) {
       has_all_edges_ = scene_.shading == ShadingModel::kContinuous &&

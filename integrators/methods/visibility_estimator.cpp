@@ -126,7 +126,7 @@ VisibilityProbe VisibilityEstimator::probe(const Point& point) const {
   try {
     result.value = film_point(point, nullptr, rays);
   } catch (const UntraceableRay&) {
-    // The run itself tells of it.
+    // The run itself reports it.
   }
   const LineWork& after = LineLight::work();
   result.point_cost = kPointCost + static_cast<double>(rays.closest);

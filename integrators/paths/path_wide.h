@@ -33,14 +33,14 @@ inline void PathTracer<S, Visitor>::evaluate_wide(std::span<Walk*> walks,
     const Scattering<Place>& scattering = *walk->scattering;
     count += scattering.bsdf().lobes().below || dot(scattering.normal(), *direction(*walk)) > 0;
   }
-  Grouped<Bsdf, Bsdf::Evaluation, kMostWalks> asked;
+  Grouped<Bsdf, Bsdf::Evaluation, kMostWalks> queries;
   BsdfValue values[kMostWalks];
   for (size_t i = 0; i < count; ++i) {
     const Scattering<Place>& scattering = *walks[i]->scattering;
-    asked.add(scattering.bsdf(), {&scattering.normal(), &scattering.wi(), direction(*walks[i]),
-                                  &values[i], scattering.at()});
+    queries.add(scattering.bsdf(), {&scattering.normal(), &scattering.wi(), direction(*walks[i]),
+                                    &values[i], scattering.at()});
   }
-  asked.for_each([](const Bsdf& bsdf, auto items) { bsdf.eval_with_pdf_each(items); });
+  queries.for_each([](const Bsdf& bsdf, auto items) { bsdf.eval_with_pdf_each(items); });
   for (size_t i = 0; i < count; ++i) {
     Walk& walk = *walks[i];
     then(walk, coloured(walk, walk.scattering->held(values[i]), *direction(walk)));

@@ -47,7 +47,7 @@ using PlaceScalar = std::conditional_t<std::is_same_v<Visitor, Unmoved>, double,
 template <class S, class Visitor>
 inline constexpr bool kColoursAlone = !std::is_same_v<PlaceScalar<S, Visitor>, S>;
 
-// A path under way: a vertex, how it was reached, and what is asked for next.
+// A path under way: a vertex, how it was reached, and what it needs next.
 template <class S, class Visitor>
 struct Walk {
   using Place = PlaceScalar<S, Visitor>;
@@ -62,7 +62,7 @@ struct Walk {
   int copies = 1;             // of paths that share the beginning, this one among them
   bool again = false;         // all but what further directions bring has been added
   bool lit = false;           // the lights at the vertex have been
-  bool failed = false;        // it asked for a ray that cannot be traced
+  bool failed = false;        // it needed a ray that cannot be traced
   EdgeStart* edge = nullptr;  // where the surface lies, if the path starts on an edge and is there
   bool beside_edge = false;   // the path starts on an edge, or just beside it as seen, and is there
   SurfacePoint<Place> surface;

@@ -49,7 +49,7 @@ inline Vec3<Dual> warped(const Vec3d& w, const DirectionWarp& warp) {
   return {{w.x, v.x}, {w.y, v.y}, {w.z, v.z}};
 }
 
-// What one auxiliary ray tells.
+// What one auxiliary ray found.
 struct AuxiliaryRay {
   Vec3d direction;            // w', unit
   double weight = 1;          // exp(kappa (1 - w . w')): one over its density, but for a constant
@@ -77,7 +77,7 @@ class WarpSums {
 
 // What the fields of some directions cost.
 struct WarpCount {
-  uint64_t fields = 0;     // directions whose motion rays told
+  uint64_t fields = 0;     // directions whose motion rays determined
   uint64_t dominated = 0;  // of which one ray held nine tenths of the weights
   uint64_t dropped = 0;    // rays on an edge to rounding
 

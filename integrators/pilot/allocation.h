@@ -16,7 +16,7 @@ inline constexpr double kNoLimit = std::numeric_limits<double>::infinity();
 // that are left, where a unit of work takes `each`: kNoLimit if no work was met.
 double most_work(double left, double each, int samples, size_t pixels);
 
-// What a pilot tells of one sample of a term, in units that all terms share.
+// What a pilot finds of one sample of a term, in units that all terms share.
 struct TermFigures {
   double variance = 0;  // a mean over pixels, without the thousandth of them that varies most
   double cost = 0;

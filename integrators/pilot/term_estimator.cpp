@@ -369,7 +369,7 @@ Rgb<Lanes> TermEstimator::at_rest(const Rgb<Lanes>& turning, const Rgb<Lanes>& t
 
 // All that turns change is linear in them. With one parameter they have lanes of their own. With
 // more a path is traced twice, first with directions at rest; but terms at vertices draw edges by
-// how fast these move, so they are asked for both at once.
+// how fast these move, so they evaluate both at once.
 TermEstimator::Sample TermEstimator::sample(const PixelSample& at, const Rng& key, bool turns,
                                             SampleSink& sink) const {
   PixelCounts ones;

@@ -19,7 +19,7 @@ class ValuePaths {
 
   struct Found {
     Rgb<Dual> radiance;
-    bool failed;  // it asked for a ray that cannot be traced
+    bool failed;  // it needed a ray that cannot be traced
   };
   // found[i]: by the path of samples[i]; at most kMostTogether.
   void trace(std::span<const KeyedSample> samples, int light_samples, RayCount& rays,

@@ -12,7 +12,7 @@
 
 namespace limn {
 
-// What a sample comes to that asks for a ray which cannot be traced.
+// The value of a sample that needs a ray which cannot be traced.
 inline const double kNan = std::numeric_limits<double>::quiet_NaN();
 inline const Lanes kNotFinite{kNan, kNan, kNan, kNan};
 
@@ -33,7 +33,7 @@ class TermEstimator::VertexMotions {
 class TermEstimator::VertexTerms {
  public:
   // held: how the vertices of the path move while its directions are held, if what turns change is
-  // asked for; else null.
+  // needed; else null.
   // traced: added to, unless it is null.
   VertexTerms(const TermEstimator& estimator, const PixelCounts& counts, const VertexMotions* held,
               TracedDraws* traced, SampleSink& sink)

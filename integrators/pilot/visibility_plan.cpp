@@ -23,7 +23,7 @@ namespace limn {
 namespace {
 
 // The squared error of even points falls like this power of their number, and so of their time:
-// that of what jumps over a square.
+// that of a discontinuous function over a square.
 constexpr double kEven = 1.5;
 constexpr int kCell = 8;  // the side of a cell [pixels]; not tuned
 // Rays of a look in the pilot; its points are as many as take the time of two looks by lines,

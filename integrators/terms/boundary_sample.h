@@ -6,8 +6,8 @@
 // v(X_i) are velocities of points of the scene, and v_ray is that of the point x as the viewer's
 // ray carries it along. The rate is linear in velocities. So one record serves all modes: forward
 // mode puts velocities in, reverse mode hands amount * scale * g_i on to what moves the points, and
-// a pilot asks what other motions of the viewer would add. A term draws, tests visibility and hands
-// the record to a sink; it does not know the mode.
+// a pilot evaluates what other motions of the viewer would add. A term draws, tests visibility and
+// hands the record to a sink; it does not know the mode.
 #include <array>
 #include <optional>
 #include <vector>
@@ -86,7 +86,7 @@ class BoundarySink {
   virtual bool takes(const BoundaryForm& form, const Rng& key) = 0;
   // Russian roulette for the sample. scattered: throughput times scattering.
   virtual bool survives(const Rgb<double>& /*scattered*/, const Rng& /*key*/) { return true; }
-  // Tells what its rays found; amount: zero if it is occluded.
+  // Reports what its rays found; amount: zero if it is occluded.
   virtual void traced(const Rgb<double>& /*scattered*/, const RayCount& /*rays*/,
                       const Rgb<double>& /*amount*/) {}
   // Adds amount times the rate of the sample taken up.
@@ -115,7 +115,7 @@ struct FilmLineSample {
 // A sink of samples of the film: v_ray is that of the camera's ray through a fixed film position.
 class FilmSink : public BoundarySink {
  public:
-  // The film position of the sample, before all else. False if no pixel asks for it.
+  // The film position of the sample, before all else. False if no pixel needs it.
   virtual bool at(const FilmPlace& place) = 0;
   virtual void add_line(const FilmLineSample& line, const Rgb<double>& difference) = 0;
 };

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "integrators/edges/face_jumps.h"
+#include "integrators/edges/face_discontinuities.h"
 #include "integrators/edges/near_faces.h"
 #include "integrators/paths/path_follow.h"
 #include "integrators/paths/straight_way.h"
@@ -90,8 +90,8 @@ Sides nearest_faces(const PathContext& context, const EdgeMesh& mesh, const Edge
   return sides;
 }
 
-// Textures may jump at the edge: they are looked up beside it. by: in barycentric coordinates; more
-// than lines may be off the edge that they are taken for.
+// Textures may be discontinuous at the edge: they are looked up beside it. by: in barycentric
+// coordinates; more than lines may be off the edge that they are taken for.
 void step_aside(const std::array<Vec3d, 3>& corners, const Vec3d& into, double by,
                 std::array<double, 2>& b) {
   const Vec3d e1 = corners[1] - corners[0], e2 = corners[2] - corners[0], n = cross(e1, e2);
@@ -178,8 +178,8 @@ Ray ending_on(Ray ray, FaceRef face, double distance) {
   return ray;
 }
 
-// Starts both sides of an edge inside of a face, where the face's texture jumps. False if the edge
-// is hidden.
+// Starts both sides of an edge inside of a face, where the face's texture is discontinuous. False
+// if the edge is hidden.
 bool start_beside_texture(const PathContext& context, const FacesAround& around,
                           const EdgeView& view, const Ray& ray, bool known_to_be_seen,
                           RadianceBeside& beside, RayCount& rays) {

@@ -17,9 +17,9 @@ constexpr double kLeastDepth = 0x1p-10;
 constexpr double kLeastSpeed = 0x1p-11;
 // Of the fastest: of what moves along its line, or within the plane through it and the camera.
 constexpr double kRounding = 0x1p-16;
-// Of the film's width: what is shorter is not told of. Of the edges of fine meshes some are in one
+// Of the film's width: what is shorter is not reported. Of the edges of fine meshes some are in one
 // line by chance: of edges of this length, a hundred widths in all, one pair in 200 scenes.
-constexpr double kLeastTold = 0x1p-4;
+constexpr double kLeastReported = 0x1p-4;
 // Edges in a cell, if they were points all over the film. Not tuned.
 constexpr double kInCell = 4;
 constexpr int kMostCells = 1 << 12;  // along an axis
@@ -66,7 +66,7 @@ class Finder {
                              ? 1
                              : 2 * camera.x_factor * std::tan(value(camera.fov) * (kPi / 360));
     tolerance_ = kEdgeOn * camera.width / width;
-    least_told_ = kLeastTold * camera.width;
+    least_told_ = kLeastReported * camera.width;
     result_.in_line.resize(moving.size() + resting.size());
     for (const FilmEdge& e : moving)
       for (int i = 0; i < kLanes; ++i)

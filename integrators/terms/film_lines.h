@@ -31,8 +31,8 @@ struct EdgesInLine {
 };
 
 // Which of the `moving` edges are in the same line on the film as another one, or as one of the
-// `resting` ones, to what rays in floats can tell, for a part of it, at a depth that differs by a
-// five-hundredth. (What is less far apart is hardly told apart from a place aside of the camera,
+// `resting` ones, as far as rays in floats resolve, for a part of it, at a depth that differs by a
+// five-hundredth. (What is less far apart hardly differs from a place aside of the camera,
 // too: such edges are both seen.) No face need be edge-on for that: sheets or open vessels whose
 // rims are as high as the camera. (What touches is in one place, and is not meant.)
 EdgesInLine find_edges_in_line(std::span<const FilmEdge> moving, std::span<const FilmLine> resting,

@@ -7,8 +7,8 @@
 
 namespace limn {
 
-// What a pilot asks of a vertex: what it would add if directions at the path's first vertex turned
-// about the axes x, y and z, on the same samples. Lanes 0 to 2 are the axes.
+// What a pilot evaluates at a vertex: what it would add if directions at the path's first vertex
+// turned about the axes x, y and z, on the same samples. Lanes 0 to 2 are the axes.
 struct TurnedVertex {
   Vec3<Lanes> velocity{};  // of the vertex as it then slides [scene units per unit of the turn]
   DirectionTurn turn;      // of directions here, in the same unit; zero but at the first vertex
@@ -34,10 +34,10 @@ class VertexLanes final : public BoundarySink {
     const Scene& scene;
     const WarpField* warp = nullptr;  // by which directions move, in place of turns
     int parameters = kLanes;          // the first lanes; others are a pilot's
-    TracedDraws* traced = nullptr;    // null unless a pilot asks
+    TracedDraws* traced = nullptr;    // null but in a pilot
     SampleLog* log = nullptr;
   };
-  // surface: the vertex as it moves. turned: null unless a pilot asks.
+  // surface: the vertex as it moves. turned: null but in a pilot.
   VertexLanes(const Setting& setting, const PathVertex& vertex, const SurfacePoint<Dual>& surface,
               TurnedVertex* turned)
       : BoundarySink(setting.log),

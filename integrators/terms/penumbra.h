@@ -3,7 +3,7 @@
 // place where the edge cuts into the emitter is small, and what the edge adds there is as large:
 // samples of pixels and of directions meet it ever more rarely. So what `direct` holds is found
 // from both ends: `direct` itself lists edges at the vertices that paths come to; `penumbra` draws
-// lines from an emitter through a point of an edge to a vertex, and asks who sees that
+// lines from an emitter through a point of an edge to a vertex, and finds who sees that
 // (penumbra_boundary.cpp). Each contribution is shared between the two by how densely they are
 // expected to meet it (the power heuristic; any shares that add up to one are right). Rays leave
 // surfaces with interpolated normals above their faces (surface_point.h), where lines do not end:

@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <optional>
 
-#include "integrators/terms/glare_edges.h"
+#include "integrators/terms/highlight_edges.h"
 #include "integrators/terms/mirror_edges.h"
 #include "integrators/terms/term_table.h"
 #include "integrators/terms/vertex_edges.h"
@@ -27,8 +27,9 @@ class BoundaryTerm final : public Term {
         nothing_(input.warps && std::all_of(edges_.objects.begin(), edges_.objects.end(),
                                             [](const EdgeMesh& m) { return m.edges.empty(); })) {
     if (context_.flat_mirrors) mirrors_.emplace(context_, edges_, sampler_);
-    if (context_.mirrored) glare_.emplace(context_.scene, edges_, sampler_, *context_.mirrored);
-    emitters_jump_ = std::ranges::any_of(edges_.objects, [&](const EdgeMesh& mesh) {
+    if (context_.mirrored)
+      highlights_.emplace(context_.scene, edges_, sampler_, *context_.mirrored);
+    discontinuous_emitters_ = std::ranges::any_of(edges_.objects, [&](const EdgeMesh& mesh) {
       return is_textured_emitter(mesh) && (mesh.of_texture() || mesh.count(EdgeClass::kSharp) > 0);
     });
   }
@@ -37,10 +38,10 @@ class BoundaryTerm final : public Term {
   void add_at_vertex(const PathVertex& vertex, int samples, BoundarySink& sink) const override {
     if (mirrors_) mirrors_->add_at_vertex(vertex, samples, sink);
     if (is_left_out(vertex.bounces)) return;
-    static thread_local GlareEdges::View view;
+    static thread_local HighlightEdges::View view;
     const EdgeQuery query = query_at(vertex);
-    const bool looks = glare_ && scatters_again(vertex.bounces);
-    if (looks) add_before_glare(vertex, query, samples, view, sink);
+    const bool looks = highlights_ && scatters_again(vertex.bounces);
+    if (looks) add_before_highlights(vertex, query, samples, view, sink);
     add_draws(vertex, query, samples, looks ? &view : nullptr, sink);
   }
 
@@ -63,8 +64,8 @@ class BoundaryTerm final : public Term {
   // Whether what arrives at a vertex is what regions emit, and nothing else.
   bool is_left_out(int bounces) const {
     const int max_depth = context_.scene.max_depth;
-    return part_.regions && part_.regions->hold_all() && !emitters_jump_ && max_depth >= 0 &&
-           bounces + 2 >= max_depth;
+    return part_.regions && part_.regions->hold_all() && !discontinuous_emitters_ &&
+           max_depth >= 0 && bounces + 2 >= max_depth;
   }
   // Whether what a direction from a vertex meets is lit by what it scatters.
   bool scatters_again(int bounces) const {
@@ -72,11 +73,11 @@ class BoundaryTerm final : public Term {
     return max_depth < 0 || bounces + 2 < max_depth;
   }
   // view: replaced.
-  void add_before_glare(const PathVertex& vertex, const EdgeQuery& query, int samples,
-                        GlareEdges::View& view, BoundarySink& sink) const;
+  void add_before_highlights(const PathVertex& vertex, const EdgeQuery& query, int samples,
+                             HighlightEdges::View& view, BoundarySink& sink) const;
   // view: what is left out, if anything.
   void add_draws(const PathVertex& vertex, const EdgeQuery& query, int samples,
-                 const GlareEdges::View* view, BoundarySink& sink) const;
+                 const HighlightEdges::View* view, BoundarySink& sink) const;
   bool is_textured_emitter(const EdgeMesh& mesh) const {
     if (!mesh.shape.valid()) return false;
     const Shape& shape = context_.scene.shape(mesh.shape);
@@ -91,7 +92,7 @@ class BoundaryTerm final : public Term {
     EdgeDraw draw{mesh, sample, part_, key};
     draw.roulette = roulette;
     add_edge_point(context_, vertex, draw, sink);
-    if (!emitters_jump_ || !part_.regions || !is_textured_emitter(mesh)) return;
+    if (!discontinuous_emitters_ || !part_.regions || !is_textured_emitter(mesh)) return;
     if (is_outline(mesh, sample.edge.edge, vertex.surface.p)) return;
     for (size_t k = 0; k < part_.regions->size(); ++k) {
       if (part_.regions->shape(k) != mesh.shape) continue;
@@ -106,24 +107,26 @@ class BoundaryTerm final : public Term {
   const EdgeSampler& sampler_;
   double build_seconds_;
   RadiancePart part_;
-  std::optional<MirrorEdges> mirrors_;  // none where there are no flat ones
-  std::optional<GlareEdges> glare_;     // none where nothing mirrors
-  bool nothing_;                        // warped directions follow all edges
-  bool emitters_jump_;                  // some may, by their textures
+  std::optional<MirrorEdges> mirrors_;        // none where there are no flat ones
+  std::optional<HighlightEdges> highlights_;  // none where nothing mirrors
+  bool nothing_;                              // warped directions follow all edges
+  bool discontinuous_emitters_;               // some may be, by their textures
 };
 
-void BoundaryTerm::add_before_glare(const PathVertex& vertex, const EdgeQuery& query, int samples,
-                                    GlareEdges::View& view, BoundarySink& sink) const {
+void BoundaryTerm::add_before_highlights(const PathVertex& vertex, const EdgeQuery& query,
+                                         int samples, HighlightEdges::View& view,
+                                         BoundarySink& sink) const {
   static thread_local std::vector<DirectPoint> points;
-  glare_->list(vertex, query, view);
+  highlights_->list(vertex, query, view);
   if (view.count == 0) return;
   if (sink.log()) {
     sink.log()->push_back(
-        fmt::format("  {} pieces of silhouettes before glare", view.pieces.size()));
+        fmt::format("  {} pieces of silhouettes in front of highlights", view.pieces.size()));
   }
   // Not the numbers of `direct`, whose copies begin with the first.
   const Rng key = vertex.key.at(Purpose::kDirectCopy, 0);
-  glare_->draw(view, query, key.at(Purpose::kDirect, vertex.bounces), samples, sink.cost(), points);
+  highlights_->draw(view, query, key.at(Purpose::kDirect, vertex.bounces), samples, sink.cost(),
+                    points);
   for (size_t i = 0; i < points.size(); ++i) {
     const Rng own = key.copy(Purpose::kEdgeCopy, static_cast<int>(i));
     add_drawn(vertex, points[i].sample, own, false, sink);
@@ -131,7 +134,7 @@ void BoundaryTerm::add_before_glare(const PathVertex& vertex, const EdgeQuery& q
 }
 
 void BoundaryTerm::add_draws(const PathVertex& vertex, const EdgeQuery& query, int samples,
-                             const GlareEdges::View* view, BoundarySink& sink) const {
+                             const HighlightEdges::View* view, BoundarySink& sink) const {
   static thread_local std::vector<std::optional<EdgeSample>> drawn;
   draw_edges(sampler_, query, vertex.key, vertex.bounces, samples, drawn);
   TermCost& cost = sink.cost();
@@ -140,9 +143,9 @@ void BoundaryTerm::add_draws(const PathVertex& vertex, const EdgeQuery& query, i
     if (!drawn[i]) {
       ++cost.no_edge;
       if (sink.log()) sink.log()->push_back("  edge: none found");
-    } else if (view && glare_->hold(*view, query, *drawn[i])) {
+    } else if (view && highlights_->hold(*view, query, *drawn[i])) {
       ++cost.zero_weight;
-      if (sink.log()) sink.log()->push_back("  edge: before glare, left to others");
+      if (sink.log()) sink.log()->push_back("  edge: in front of a highlight, left to others");
     } else {
       add_drawn(vertex, *drawn[i], vertex.key.copy(Purpose::kEdgeCopy, i), true, sink);
     }

@@ -1,8 +1,8 @@
 // The boundary term of delta lights: the edges of their sharp shadows, listed as seen from the
 // light and seen in turn by the camera and by the vertices of paths.
 //
-// A point, or parallel light, lights all or nothing of a surface: radiance jumps where a plane
-// through the light and an edge of the mesh meets what lies behind the edge. With y(t) =
+// A point, or parallel light, lights all or nothing of a surface: radiance is discontinuous where a
+// plane through the light and an edge of the mesh meets what lies behind the edge. With y(t) =
 // (1 - t) y0 + t y1 a point of the edge, w(t) the direction in which light passes through it (y - l
 // for a light at l, the direction d of parallel light) and N = w(0) x (y1 - y0), the function
 //   G(x) = N . (x - y0)

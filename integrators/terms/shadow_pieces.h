@@ -69,8 +69,8 @@ struct ShadowDraw {
 
 class ShadowPieces {
  public:
-  // input: edges of the scene; it and the scene must outlive this object. free: any velocities are
-  // asked for, not only those in the tangents. The result does not depend on `threads`.
+  // input: edges of the scene; it and the scene must outlive this object. free: any velocities may
+  // come, not only those in the tangents. The result does not depend on `threads`.
   ShadowPieces(const PathContext& context, const EdgeSamplerInput& input,
                std::span<const ShadowEdge> edges, bool free, int threads);
 

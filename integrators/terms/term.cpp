@@ -24,13 +24,13 @@ bool has_term(const EdgeSamplerType& sampler, const TermType& type, bool closed,
 std::vector<const TermType*> terms_of(const Scene& scene, const EdgeSamplerType& sampler,
                                       bool closed, bool moved_film) {
   std::vector<const TermType*> types;
-  bool (*asked)(const Scene&) = nullptr;  // looks at the whole environment: once for rows alike
+  bool (*tested)(const Scene&) = nullptr;  // looks at the whole environment: once for rows alike
   bool applies = false;
   for (const TermType& type : term_types()) {
     if (!has_term(sampler, type, closed, moved_film)) continue;
-    if (type.applies != asked) {
-      asked = type.applies;
-      applies = asked(scene);
+    if (type.applies != tested) {
+      tested = type.applies;
+      applies = tested(scene);
     }
     if (applies) types.push_back(&type);
   }

@@ -132,8 +132,8 @@ class TermInput {
   const FreeMotion* free = nullptr;
 
   // Edges of all shapes (object i is shape i), as an edge sampler takes them; light polygons and
-  // the environment, without the regions of light, once edge_sampler() was asked. Made when a term
-  // first asks.
+  // the environment, without the regions of light, once edge_sampler() was called. Made when a term
+  // first needs them.
   const EdgeSamplerInput& edges();
   // The regions of light; null if the sampler has none apart, or the scene has none.
   const LightRegions* regions();
@@ -141,10 +141,10 @@ class TermInput {
   const EmitterEdges* emitter_edges();
   // The edges that shading points choose among: all, but for those that warped directions follow.
   const EdgeSamplerInput& chosen_edges();
-  // What shading points choose edges by, shared by all terms. Made when a term first asks.
+  // What shading points choose edges by, shared by all terms. Made when a term first needs it.
   const EdgeSampler& edge_sampler();
   double edge_sampler_seconds() const { return edge_sampler_seconds_; }
-  // Null if no term has asked.
+  // Null if no term needed them.
   const EdgeSamplerInput* made_edges() const { return edges_.get(); }
   double edges_seconds() const { return edges_seconds_; }
 
@@ -171,7 +171,7 @@ struct TermType {
   bool traces_paths = false;
   bool edges = false;                  // it samples edges: rare events
   bool moved_with_directions = false;  // its mean changes where directions move, direction_field.h
-  int film_stream = 0;                 // tells the random numbers of terms on the film apart
+  int film_stream = 0;                 // distinguishes the random numbers of terms on the film
   bool regions = false;     // it is of samplers that keep regions of light apart, and of no others
   bool moved_film = false;  // it is of methods that move positions on the film, and of no others
 

@@ -9,7 +9,7 @@ namespace limn {
 
 EdgeQuery query_at(const PathVertex& vertex);
 
-// Replaces `drawn` by draws at a vertex of the path that `key` is of, as many as asked for: draw i
+// Replaces `drawn` by draws at a vertex of the path that `key` is of, `count` of them: draw i
 // by the path's copy i.
 void draw_edges(const EdgeSampler& sampler, const EdgeQuery& query, const Rng& key, int bounces,
                 int count, std::vector<std::optional<EdgeSample>>& drawn);

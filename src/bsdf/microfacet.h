@@ -54,7 +54,7 @@ S ggx_g1_over_cos(const S& cos_v, const S& alpha) {
 
 // Beckmann, Walter's rational approximation (27) in a = 1 / (alpha tan): at most 0.35 % off, and
 // what Mitsuba evaluates. The rational passes 1 at a = 1.548; from there on G1 is 1 (Walter and
-// Mitsuba go on to a = 1.6 and jump there by 6e-5).
+// Mitsuba go on to a = 1.6 and are discontinuous there, by 6e-5).
 template <class S>
 S beckmann_g1_over_cos(const S& cos_v, const S& alpha) {
   constexpr double kOne = 1.5481331257;  // root of 3.535 a + 2.181 a^2 = 1 + 2.276 a + 2.577 a^2

@@ -145,7 +145,7 @@ thread_local std::string ExrFile::complaint_;
 // Reads the first part of a file as an image.
 class ExrReader {
  public:
-  // alpha: channel A alone; has_pixels() tells whether there is one.
+  // alpha: channel A alone; has_pixels() says whether there is one.
   explicit ExrReader(const ExrFile& exr, bool alpha = false) : exr_(exr), alpha_(alpha) {
     exr.check(exr_get_storage(exr.context(), 0, &storage_));
     exr.check(exr_get_compression(exr.context(), 0, &compression_));

@@ -1,4 +1,4 @@
-// Images of any format that is known, told apart by their first bytes.
+// Images of any format that is known, distinguished by their first bytes.
 #include <algorithm>
 #include <cerrno>
 #include <cmath>

@@ -13,7 +13,7 @@ RawMesh parse_ply(const std::string& file);  // read_ply.cpp
 
 struct SerializedMesh {
   RawMesh mesh;
-  bool face_normals = false;  // the file asks for flat shading
+  bool face_normals = false;  // the file wants flat shading
 };
 // Parses a mesh of Mitsuba's serialized format. index: of the mesh in the file, from 0.
 SerializedMesh parse_serialized(const std::string& file, int64_t index);  // read_serialized.cpp

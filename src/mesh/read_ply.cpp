@@ -78,7 +78,7 @@ class PlyCursor {
   PlyCursor(std::string file, const std::string& data)
       : file_(std::move(file)), data_(data), line_begin_(data.data()) {}
 
-  // In text at the latest word; in binary bodies the byte is told, counted from 0.
+  // In text at the latest word; in binary bodies the byte is stated, counted from 0.
   [[noreturn]] void fail(const std::string& message) const { fail_at_column(column_, message); }
   // Of an element as a whole.
   [[noreturn]] void fail_element(const std::string& message) const { fail_at_column(0, message); }

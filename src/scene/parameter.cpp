@@ -25,8 +25,9 @@ namespace {
                                            join(nearest_names(name, names, 5)) + ")");
 }
 
-// Whether a texture in use jumps where no edge is known: then nothing may move. Those of surfaces
-// list the borders of their texels, but for the slopes of bumps, which jump between faces, too.
+// Whether a texture in use is discontinuous where no edge is known: then nothing may move. Those of
+// surfaces list the borders of their texels, but for the slopes of bumps, which are discontinuous
+// between faces, too.
 bool has_texel_borders(const Scene& scene) {
   for (const Shape& shape : scene.shapes) {
     for (int k = 0; k < shape.bsdf->texture_count(); ++k) {

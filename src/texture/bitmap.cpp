@@ -85,11 +85,11 @@ class Bitmap final : public Texture {
   Rgb<double> mean() const override { return of_use(texels_->mean()); }
   Range range() const override { return {texels_->least(), texels_->most()}; }
   bool jumps_between_texels() const override { return settings_.nearest; }
-  // Borders of texels. Where both sides have one value, radiance does not jump.
+  // Borders of texels. Where both sides have one value, radiance is continuous.
   bool add_jumps(const std::array<std::array<double, 2>, 3>& uv, size_t most,
-                 Jumps& jumps) const override {
+                 Jumps& lines) const override {
     if (!settings_.nearest) return true;
-    return add_grid_lines(uv, settings_.to_uv, {texels_->width(), texels_->height()}, most, jumps);
+    return add_grid_lines(uv, settings_.to_uv, {texels_->width(), texels_->height()}, most, lines);
   }
   bool has_period_one() const override {
     return settings_.wrap == Wrap::kRepeat && settings_.to_uv.keeps_integers();

@@ -40,8 +40,8 @@ class Checkerboard final : public Texture {
     return range;
   }
   bool add_jumps(const std::array<std::array<double, 2>, 3>& uv, size_t most,
-                 Jumps& jumps) const override {
-    return add_grid_lines(uv, to_uv_, {2, 2}, most, jumps);
+                 Jumps& lines) const override {
+    return add_grid_lines(uv, to_uv_, {2, 2}, most, lines);
   }
   bool has_period_one() const override { return to_uv_.keeps_integers(); }
   std::vector<ParameterRef> parameters() override {

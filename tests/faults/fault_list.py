@@ -105,15 +105,15 @@ FAULTS = [
           "const double cut = kTaper * rng.uniform();", "const double cut = 0;",
           "test_moving_directions", "FilmMotion.RestsWhereFiltersEnd"),
 
-    Fault("specular", "samples counted twice", TERMS + "glare_edges.cpp",
+    Fault("specular", "samples counted twice", TERMS + "highlight_edges.cpp",
           "if (view.count == 0 || !cap_of(view, direction(query, sample))) return false;",
           "if (view.count < 1000) return false;",
           "test_regions", "MirroredLight.*"),
     Fault("specular", "mixture's density", "integrators/lights/mirrored_light.cpp",
           "mixture.share * sum + (1 - mixture.share) * scattered",
           "mixture.share * sum + scattered", "test_regions", "MirroredLight.*"),
-    Fault("specular", "edges behind the plane drawn as before it", TERMS + "glare_edges.cpp",
-          "glare.normal) > glare.depth;", "glare.normal) > 1e9;",
+    Fault("specular", "edges behind the plane drawn as before it", TERMS + "highlight_edges.cpp",
+          "highlight.normal) > highlight.depth;", "highlight.normal) > 1e9;",
           "test_regions", "MirroredLight.*"),
 
     Fault("MIS", "density of an area light x 1.5", "src/light/area.cpp",

@@ -235,7 +235,7 @@ Steps at_two_steps(const Scene& scene, const std::string& name, double wide, dou
 }
 
 // Light is linear in a lamp's radiance, and so is what few samples make of it, whatever the step:
-// the lights and the glare that they draw are those of the scene as it is.
+// the lights and the highlights that they draw are those of the scene as it is.
 TEST(Differences, DrawLightsAlike) {
   const TempFiles files;
   SceneParts parts = mixed_scene(files);
@@ -250,7 +250,7 @@ TEST(Differences, DrawLightsAlike) {
 }
 
 // Radiance is a polynomial of reflectances, so differences change with the square of a small step:
-// no path ends in one of the images alone, or goes to the glare in one of them alone.
+// no path ends in one of the images alone, or goes to the highlight in one of them alone.
 TEST(Differences, GoAlikeWhateverTheMaterials) {
   const TempFiles files;
   SceneParts parts = mixed_scene(files);

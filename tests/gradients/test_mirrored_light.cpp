@@ -1,11 +1,12 @@
-// The sun's glare on flat gloss: a share of directions is drawn there, and nothing else changes.
+// The sun's highlight on flat gloss: a share of directions is drawn there, and nothing else
+// changes.
 #include "integrators/lights/mirrored_light.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "integrators/paths/path_follow.h"
-#include "integrators/terms/glare_edges.h"
+#include "integrators/terms/highlight_edges.h"
 #include "integrators/terms/vertex_edges.h"
 #include "limn/core/parameter.h"
 #include "limn/integrators/backward.h"
@@ -68,7 +69,7 @@ Scene scene_with(const TempFiles& files, double alpha, double sun, double lamp =
 
 struct Case {
   double alpha, sun, lamp;  // radius of the sun [degrees], or of a lamp
-  Vec3d glare;              // as DrawsFromItsDensity sees it
+  Vec3d highlight;          // as DrawsFromItsDensity sees it
 };
 // Lobes wider than the light, and narrower; a point.
 const Case kCases[] = {{0.05, 1, 0, {0.5, -0.5, 0.4}},
@@ -89,10 +90,10 @@ struct Point {
 };
 
 // Draws of the images are as their density says: means of functions that are zero but in a cone
-// around the glare, by draws, and by the density over directions that are uniform in the cone.
+// around the highlight, by draws, and by the density over directions that are uniform in the cone.
 TEST(MirroredLight, DrawsFromItsDensity) {
   const TempFiles files;
-  for (const auto& [alpha, sun, lamp, glare] : kCases) {
+  for (const auto& [alpha, sun, lamp, highlight] : kCases) {
     const Scene scene = scene_with(files, alpha, sun, lamp);
     const auto tracer = make_embree_tracer(scene, 1);
     const Lights lights(scene);
@@ -104,7 +105,7 @@ TEST(MirroredLight, DrawsFromItsDensity) {
     EXPECT_GT(mixture.share, 0.01);
     EXPECT_LT(mixture.share, 0.5);
     mixture.share = 1;  // of the images alone
-    const Vec3d x = normalize(glare), y = normalize(cross(x, Vec3d{0, 0, 1})), z = cross(x, y);
+    const Vec3d x = normalize(highlight), y = normalize(cross(x, Vec3d{0, 0, 1})), z = cross(x, y);
     const double cone = 0.25;  // radians
     const auto functions = [&](const Vec3d& w) {
       const double u = dot(w, y) / cone, v = dot(w, z) / cone;
@@ -137,10 +138,10 @@ TEST(MirroredLight, DrawsFromItsDensity) {
 }
 
 // Radiance from points of the wall with and without: the same mean, and squares that are ruled no
-// more by paths that meet the glare by chance.
+// more by paths that meet the highlight by chance.
 TEST(MirroredLight, ChangesNoMean) {
   const TempFiles files;
-  for (const auto& [alpha, sun, lamp, glare] : kCases) {
+  for (const auto& [alpha, sun, lamp, highlight] : kCases) {
     const Scene scene = scene_with(files, alpha, sun, lamp);
     const auto tracer = make_embree_tracer(scene, 1);
     const Lights lights(scene);
@@ -227,9 +228,9 @@ std::string gloss_floor(const TempFiles& files, bool coarse, double alpha) {
 }
 
 // Lines from the sun share with points of a shadow by the density of directions before it. The
-// floor as a mesh of too many faces to be looked through has none of the glare's: where a wall sees
-// the shadow of a body in it, what both terms find together must be the same (with lines that know
-// nothing of the glare z is 6.6).
+// floor as a mesh of too many faces to be looked through has none of the highlight's: where a wall
+// sees the shadow of a body in it, what both terms find together must be the same (with lines that
+// know nothing of the highlight z is 6.6).
 TEST(MirroredLight, LinesFromTheSunKnowOfIt) {
   const TempFiles files;
   GradientOptions options;
@@ -251,9 +252,10 @@ TEST(MirroredLight, LinesFromTheSunKnowOfIt) {
   expect_equal(found[0].parameters[0], found[1].parameters[0]);
 }
 
-// Edges before the glare are drawn by themselves, and left out elsewhere: with a floor of too many
-// faces to be looked through, edges that know nothing of the glare find the same, and have tails.
-TEST(MirroredLight, EdgesBeforeTheGlare) {
+// Edges in front of highlights are drawn by themselves, and left out elsewhere: with a floor of too
+// many faces to be looked through, edges that know nothing of the highlight find the same, and have
+// tails.
+TEST(MirroredLight, EdgesInFrontOfHighlights) {
   const TempFiles files;
   GradientOptions options;
   options.parameters = {"body.translate.x"};
@@ -302,9 +304,9 @@ Mesh cut_faces(Mesh mesh, int times) {
   return mesh;
 }
 
-// A floor close to a glossy box sees the sun's grazing glare in the side over it, which ends at the
-// box's own edges, below in one between two faces in view. A box of too many faces has no glare.
-TEST(MirroredLight, GrazingGlareEndsAtEdgesOfTheGloss) {
+// A floor close to a glossy box sees the sun's grazing highlight in the side over it, which ends at
+// the box's own edges, below in one between two faces in view. A box of too many faces has none.
+TEST(MirroredLight, GrazingHighlightEndsAtEdgesOfTheGloss) {
   const TempFiles files;
   GradientOptions options;
   options.parameters = {"body.translate.z"};
@@ -331,8 +333,8 @@ TEST(MirroredLight, GrazingGlareEndsAtEdgesOfTheGloss) {
 }
 
 // Of all that the view stands for, in parts of edges.
-double length_held(const GlareEdges& glare, const EdgeSamplerInput& edges,
-                   const GlareEdges::View& view, const EdgeQuery& query, Rng& rng) {
+double length_held(const HighlightEdges& highlight, const EdgeSamplerInput& edges,
+                   const HighlightEdges::View& view, const EdgeQuery& query, Rng& rng) {
   constexpr int kPlaces = 16;
   double sum = 0;
   for (uint32_t o = 0; o < edges.objects.size(); ++o) {
@@ -342,17 +344,17 @@ double length_held(const GlareEdges& glare, const EdgeSamplerInput& edges,
       if (!is_candidate(mesh, edge.edge, query.p) || is_own_edge(edges, query, edge)) continue;
       for (int k = 0; k < kPlaces; ++k) {
         const double t = (k + rng.uniform()) / kPlaces;
-        if (glare.hold(view, query, {edge, t, 1, 1})) sum += 1.0 / kPlaces;
+        if (highlight.hold(view, query, {edge, t, 1, 1})) sum += 1.0 / kPlaces;
       }
     }
   }
   return sum;
 }
 
-// Where points of outlines are drawn before glare and where they are left out elsewhere is the
-// same: the length of all that is left out, in parts of edges, by draws and by looking everywhere.
-// Caps of two lamps overlap; a cube has sharp edges both of whose faces are seen, which are left to
-// others.
+// Where points of outlines are drawn in front of highlights and where they are left out elsewhere
+// is the same: the length of all that is left out, in parts of edges, by draws and by looking
+// everywhere. Caps of two lamps overlap; a cube has sharp edges both of whose faces are seen, which
+// are left to others.
 TEST(MirroredLight, EdgesAreDrawnWhereTheyAreLeftOut) {
   const TempFiles files;
   SceneParts parts;
@@ -374,7 +376,7 @@ TEST(MirroredLight, EdgesAreDrawnWhereTheyAreLeftOut) {
   TermInput input(context, 1, {1, 1, 1, 1}, edge_sampler_type("forest"), 1);
   const auto mirrored = MirroredLight::make(scene, lights);
   ASSERT_TRUE(mirrored);
-  const GlareEdges glare(scene, input.edges(), input.edge_sampler(), *mirrored);
+  const HighlightEdges highlight(scene, input.edges(), input.edge_sampler(), *mirrored);
   RunningMean drawn, left_out;
   Rng rng(11, 0, 0);
   int views = 0;
@@ -389,20 +391,20 @@ TEST(MirroredLight, EdgesAreDrawnWhereTheyAreLeftOut) {
     const Scattering<Dual> scattering(surface, -forward, scene.shading);
     const PathVertex vertex = plain_vertex(surface, scattering, scene.shading, 0, {}, rng);
     const EdgeQuery query = query_at(vertex);
-    GlareEdges::View view;
-    glare.list(vertex, query, view);
+    HighlightEdges::View view;
+    highlight.list(vertex, query, view);
     views += view.count;
     constexpr int kSamples = 4;
     std::vector<DirectPoint> points;
     TermCost cost;
-    glare.draw(view, query, Rng(12, static_cast<uint64_t>(i), 0), kSamples, cost, points);
+    highlight.draw(view, query, Rng(12, static_cast<uint64_t>(i), 0), kSamples, cost, points);
     double length = 0;
     for (const auto& [region, sample] : points) {
-      EXPECT_TRUE(glare.hold(view, query, sample));
+      EXPECT_TRUE(highlight.hold(view, query, sample));
       length += 1 / (sample.probability * sample.pdf_t * kSamples);
     }
     drawn.add(length);
-    left_out.add(length_held(glare, input.edges(), view, query, rng));
+    left_out.add(length_held(highlight, input.edges(), view, query, rng));
   }
   const double error = std::hypot(drawn.standard_error(), left_out.standard_error());
   fmt::print("{} views: drawn {:.4f} +- {:.2g}, left out {:.4f} +- {:.2g}\n", views, drawn.mean(),
@@ -411,9 +413,9 @@ TEST(MirroredLight, EdgesAreDrawnWhereTheyAreLeftOut) {
   EXPECT_LT(std::fabs(drawn.mean() - left_out.mean()), 4.5 * error);
 }
 
-// A floor beside a corner of a glossy box sees grazing glare in one of its sides, and behind the
-// plane of that, outside of it, an edge of another one that sweeps ten times the angle. Nearly a
-// third of the points that are drawn are on edges of the lit side.
+// A floor beside a corner of a glossy box sees a grazing highlight in one of its sides, and behind
+// the plane of that, outside of it, an edge of another one that sweeps ten times the angle. Nearly
+// a third of the points that are drawn are on edges of the lit side.
 TEST(MirroredLight, EdgesBehindTheGlossAreNotBeforeIt) {
   const TempFiles files;
   SceneParts parts;
@@ -432,7 +434,7 @@ TEST(MirroredLight, EdgesBehindTheGlossAreNotBeforeIt) {
   TermInput input(context, 1, {1, 1, 1, 1}, edge_sampler_type("forest"), 1);
   const auto mirrored = MirroredLight::make(scene, lights);
   ASSERT_TRUE(mirrored);
-  const GlareEdges glare(scene, input.edges(), input.edge_sampler(), *mirrored);
+  const HighlightEdges highlight(scene, input.edges(), input.edge_sampler(), *mirrored);
   Rng rng(13, 0, 0);
   const Vec3<Dual> origin{0.607679, 1.0, 0.44904}, down{0.0, -1.0, 0.0};
   Hit hit;
@@ -441,11 +443,11 @@ TEST(MirroredLight, EdgesBehindTheGlossAreNotBeforeIt) {
   const Scattering<Dual> scattering(surface, -down, scene.shading);
   const PathVertex vertex = plain_vertex(surface, scattering, scene.shading, 0, {}, rng);
   const EdgeQuery query = query_at(vertex);
-  GlareEdges::View view;
-  glare.list(vertex, query, view);
+  HighlightEdges::View view;
+  highlight.list(vertex, query, view);
   std::vector<DirectPoint> points;
   TermCost cost;
-  glare.draw(view, query, rng, 1000, cost, points);
+  highlight.draw(view, query, rng, 1000, cost, points);
   size_t in_plane = 0;
   for (const auto& [region, sample] : points) {
     const EdgeMesh& mesh = input.edges().object(sample.edge.object);
@@ -457,7 +459,7 @@ TEST(MirroredLight, EdgesBehindTheGlossAreNotBeforeIt) {
   EXPECT_GT(7 * in_plane, points.size());
 }
 
-// What a point of a wall makes of the glare on the floor before it, of these delta lights.
+// What a point of a wall makes of the highlight on the floor before it, of these delta lights.
 struct WallPoint {
   WallPoint(const TempFiles& files, const std::string& emitters, double gloss = 0.05)
       : scene(make(files, emitters, gloss)), lights(scene) {
@@ -493,7 +495,7 @@ std::string spot(const Vec3d& p, const Vec3d& target, double cutoff, double inte
       intensity, cutoff, p.x, p.y, p.z, target.x, target.y, target.z);
 }
 
-// The share that a glare takes follows what lamps light about the point, wherever they hang or
+// The share that a highlight takes follows what lamps light about the point, wherever they hang or
 // look.
 TEST(MirroredLight, ShareFollowsWhatIsLitAround) {
   const TempFiles files;
@@ -503,7 +505,7 @@ TEST(MirroredLight, ShareFollowsWhatIsLitAround) {
   EXPECT_GT(in_middle, 0.02);
   EXPECT_LT(in_middle, 0.45);
   EXPECT_NEAR(beside, in_middle, 1e-3);
-  // A lamp that lights where the glare is, and neither the middle nor the point: more than of a
+  // A lamp that lights where the highlight is, and neither the middle nor the point: more than of a
   // bulb in the same place, and yet no more than of what its light makes of other surfaces.
   const Vec3d high{0.2, 1.2, 1};
   const std::string down = spot(high, {0.2, 0, -0.2}, 15, 5);
@@ -511,7 +513,7 @@ TEST(MirroredLight, ShareFollowsWhatIsLitAround) {
   ASSERT_EQ(lit.count, 1);
   EXPECT_GT(lit.share, WallPoint(files, bulb(high, 5)).mixture.share);
   EXPECT_LT(lit.share, 0.45);
-  // A weak glare beside a strong lamp that lights the wall alone, and is not mirrored.
+  // A weak highlight beside a strong lamp that lights the wall alone, and is not mirrored.
   const std::string strong = spot({0.2, 1.5, 1}, {0.2, 0.8, -1}, 10, 5000);
   const MirroredLight::Mixture weak = WallPoint(files, bulb({0, 1, 0}, 1) + strong).mixture;
   ASSERT_EQ(weak.count, 1);
@@ -519,7 +521,7 @@ TEST(MirroredLight, ShareFollowsWhatIsLitAround) {
   EXPECT_LT(10 * weak.share, in_middle);
 }
 
-// Images of nearly the same scene draw the same glare with the same number: neither which lamps
+// Images of nearly the same scene draw the same highlight with the same number: neither which lamps
 // are kept nor their order hangs on which of equal ones is brighter by the difference.
 TEST(MirroredLight, OrderIsThatOfTheFile) {
   const TempFiles files;
@@ -539,7 +541,8 @@ TEST(MirroredLight, OrderIsThatOfTheFile) {
     for (const size_t other : {size_t{0}, size_t{2}}) {
       ASSERT_EQ(found[other].count, found[1].count);
       for (int i = 0; i < found[1].count; ++i) {
-        EXPECT_LT(length(found[other].glare(i).toward - found[1].glare(i).toward), 1e-3) << i;
+        EXPECT_LT(length(found[other].highlight(i).toward - found[1].highlight(i).toward), 1e-3)
+            << i;
       }
     }
     // The brightest is among them though it comes last.
@@ -547,7 +550,7 @@ TEST(MirroredLight, OrderIsThatOfTheFile) {
   }
 }
 
-// The scenes of a finite difference draw by the glare of the one between them: a panel that has
+// The scenes of a finite difference draw by the highlight of the one between them: a panel that has
 // left its old plane by the step must not see what its other side mirrored there.
 TEST(MirroredLight, PanelsSeeNothingInThemselves) {
   const TempFiles files;

@@ -1,12 +1,13 @@
-// Where textures jump: the segments, their edges and samplers, and derivatives with them.
+// Where textures are discontinuous: the segments, their edges and samplers, and derivatives with
+// them.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "edgetree/forest/forest_build.h"
-#include "integrators/edges/face_jumps.h"
-#include "integrators/edges/texture_jumps.h"
+#include "integrators/edges/face_discontinuities.h"
+#include "integrators/edges/texture_discontinuities.h"
 #include "limn/core/image.h"
 #include "limn/core/rng.h"
 #include "limn/edgetree/edge_sampler_types.h"
@@ -52,16 +53,17 @@ bool is_by_axis(const Mesh& mesh, FaceId face, const Place& b) {
   return std::hypot(place.x, place.y) < 1.0 / 16;
 }
 
-Texture::Jumps jumps_of(const Texture& texture, const Mesh& mesh, FaceId face) {
-  Texture::Jumps jumps;
-  EXPECT_TRUE(add_face_jumps(texture, mesh, face, 1000, jumps));
-  return jumps;
+Texture::Jumps lines_of(const Texture& texture, const Mesh& mesh, FaceId face) {
+  Texture::Jumps lines;
+  EXPECT_TRUE(add_face_discontinuities(texture, mesh, face, 1000, lines));
+  return lines;
 }
 
 // Between two points of a face the colour changes as often as segments lie between them. How often
 // segments that stand for curves are too near to tell.
-int expect_jumps_at_segments(const Texture& texture, const Mesh& mesh, FaceId face, Rng& rng) {
-  const Texture::Jumps lines = jumps_of(texture, mesh, face);
+int expect_discontinuities_at_segments(const Texture& texture, const Mesh& mesh, FaceId face,
+                                       Rng& rng) {
+  const Texture::Jumps lines = lines_of(texture, mesh, face);
   const auto draw = [&] {
     const double u = std::sqrt(rng.uniform()), v = rng.uniform();
     return Place{u * v, u * (1 - v)};
@@ -101,19 +103,19 @@ Matrix4 turned_uv() {
   return m;
 }
 
-TEST(FaceJumps, AreWhereACheckerboardJumps) {
+TEST(FaceDiscontinuities, AreThoseOfACheckerboard) {
   Rng rng(1, 0, 0);
   for (const Matrix4& to_uv : {Matrix4{}, turned_uv()}) {
     for (int i = 0; i < 50; ++i) {
       std::array<Place, 3> uv;
       for (Place& corner : uv) corner = {4 * rng.uniform() - 2, 4 * rng.uniform() - 2};
-      expect_jumps_at_segments(*checkerboard(to_uv), mesh_of_face(uv), FaceId(0), rng);
+      expect_discontinuities_at_segments(*checkerboard(to_uv), mesh_of_face(uv), FaceId(0), rng);
     }
   }
 }
 
 // Of two colours in turn, so that each line is one of another colour.
-TEST(FaceJumps, AreWhereNearestTexelsJump) {
+TEST(FaceDiscontinuities, AreBordersOfNearestTexels) {
   const TempFiles files;
   Image image(4, 2, 1);
   for (int i = 0; i < 8; ++i) image.at(i % 4, i / 4, 0) = static_cast<float>((i + i / 4) % 2);
@@ -128,13 +130,13 @@ TEST(FaceJumps, AreWhereNearestTexelsJump) {
     for (int i = 0; i < 50; ++i) {
       std::array<Place, 3> uv;
       for (Place& corner : uv) corner = {4 * rng.uniform() - 2, 4 * rng.uniform() - 2};
-      expect_jumps_at_segments(*texture, mesh_of_face(uv), FaceId(0), rng);
+      expect_discontinuities_at_segments(*texture, mesh_of_face(uv), FaceId(0), rng);
     }
   }
 }
 
 // On spheres and disks all lines but meridians are curves; the equator runs along sides of faces.
-TEST(FaceJumps, AreCurvesOnSpheresAndDisks) {
+TEST(FaceDiscontinuities, AreCurvesOnSpheresAndDisks) {
   const TempFiles files;
   Matrix4 scaled;
   scaled.m[0][0] = 2, scaled.m[1][1] = 6;
@@ -149,7 +151,7 @@ TEST(FaceJumps, AreCurvesOnSpheresAndDisks) {
     const Mesh& mesh = scene.shapes[0].mesh;
     int left_out = 0, all = 0;
     for (uint32_t f = 0; f < mesh.faces.size(); f += 7, all += 50) {
-      left_out += expect_jumps_at_segments(*texture, mesh, FaceId(f), rng);
+      left_out += expect_discontinuities_at_segments(*texture, mesh, FaceId(f), rng);
     }
     EXPECT_LT(left_out, all / 5) << type;
   }
@@ -157,20 +159,20 @@ TEST(FaceJumps, AreCurvesOnSpheresAndDisks) {
 
 TEST(Checkerboard, LinesAlongSidesAreNotInside) {
   const auto texture = checkerboard();
-  Texture::Jumps jumps;
-  ASSERT_TRUE(texture->add_jumps({{{0, 0.25}, {0.5, 0.25}, {0.5, 0.75}}}, 10, jumps));
-  EXPECT_EQ(jumps.sides, 2);           // u = 1/2 from the second corner to the third
-  ASSERT_EQ(jumps.inside.size(), 1u);  // v = 1/2
-  EXPECT_FALSE(texture->add_jumps({{{0, 0}, {9, 0}, {9, 9}}}, 10, jumps));
+  Texture::Jumps lines;
+  ASSERT_TRUE(texture->add_jumps({{{0, 0.25}, {0.5, 0.25}, {0.5, 0.75}}}, 10, lines));
+  EXPECT_EQ(lines.sides, 2);           // u = 1/2 from the second corner to the third
+  ASSERT_EQ(lines.inside.size(), 1u);  // v = 1/2
+  EXPECT_FALSE(texture->add_jumps({{{0, 0}, {9, 0}, {9, 9}}}, 10, lines));
   EXPECT_TRUE(texture->has_period_one());
   EXPECT_FALSE(checkerboard(turned_uv())->has_period_one());
   // Coordinates of files are floats: one tenth is none.
   Matrix4 five;
   five.m[0][0] = 5;
-  jumps = {};
-  ASSERT_TRUE(checkerboard(five)->add_jumps({{{0, 0.25}, {0.1f, 0.25}, {0.1f, 0.3}}}, 10, jumps));
-  EXPECT_EQ(jumps.sides, 2);
-  EXPECT_TRUE(jumps.inside.empty());
+  lines = {};
+  ASSERT_TRUE(checkerboard(five)->add_jumps({{{0, 0.25}, {0.1f, 0.25}, {0.1f, 0.3}}}, 10, lines));
+  EXPECT_EQ(lines.sides, 2);
+  EXPECT_TRUE(lines.inside.empty());
 }
 
 // A closed body, whose faces have segments at random, and its edges.
@@ -458,8 +460,9 @@ TEST(TextureEdges, TooManyAndMeridiansAreTold) {
     gradient(fine, options, settings);
     FAIL();
   } catch (const InputError& e) {
-    EXPECT_NE(std::string(e.what()).find("its texture jumps along more than 1000000 edges"),
-              std::string::npos)
+    EXPECT_NE(
+        std::string(e.what()).find("its texture is discontinuous along more than 1000000 edges"),
+        std::string::npos)
         << e.what();
   }
   // What moves nothing needs no edges.
@@ -470,7 +473,8 @@ TEST(TextureEdges, TooManyAndMeridiansAreTold) {
     options.parameters = {"ball.translate.x"};
     bool told = false;
     for (const std::string& warning : gradient(ball, options, settings).warnings) {
-      told = told || warning.find("the textures of \"ball\" jump where the angle") != warning.npos;
+      told = told || warning.find("the textures of \"ball\" are discontinuous where the angle") !=
+                         warning.npos;
     }
     EXPECT_EQ(told, scale == 2.5);
   }

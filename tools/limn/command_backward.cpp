@@ -70,7 +70,7 @@ class BackwardCommand final : public Command {
   int run(const std::string& command_line) override {
     const Scene scene = load_scene(common_, warnings_);
     if (adjoint_.empty() && target_.empty()) throw InputError("give --adjoint or --target");
-    // Told before the loss is rendered.
+    // Reported before the loss is rendered.
     check_points(options_.points, options_.method->closed_light, options_.method.name());
     refuse_samples(*app_, options_.points, {"--spp", "--time", "--part"}, options_);
     if (!debug_.empty()) return trace(scene);

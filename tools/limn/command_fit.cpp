@@ -257,7 +257,7 @@ int FitCommand::run(const std::string&) {
   }
   settings.spp = folder.arguments().spp;
   settings.seed = folder.arguments().seed;
-  // A wrong file is told before hours of work.
+  // A wrong file is reported before hours of work.
   if (!folder.arguments().truth.empty()) check_truth(folder.arguments().truth);
   const Fit* running = nullptr;
   int64_t started = 0;

@@ -42,14 +42,14 @@ class MergeCommand final : public Command {
       if (command->name() != request.command || !command->join(reader)) continue;
       CLI::App app;
       command->add_options(app);
-      std::vector<std::string> asked = request.words;
-      asked.insert(asked.end(), {"-o", output_});
-      if (!json_.empty()) asked.insert(asked.end(), {"--json", json_});
-      if (!threads_.empty()) asked.insert(asked.end(), {"--threads", threads_});
-      if (quiet_) asked.emplace_back("--quiet");
-      std::reverse(asked.begin(), asked.end());  // as CLI11 takes them
+      std::vector<std::string> words = request.words;
+      words.insert(words.end(), {"-o", output_});
+      if (!json_.empty()) words.insert(words.end(), {"--json", json_});
+      if (!threads_.empty()) words.insert(words.end(), {"--threads", threads_});
+      if (quiet_) words.emplace_back("--quiet");
+      std::reverse(words.begin(), words.end());  // as CLI11 takes them
       try {
-        app.parse(asked);
+        app.parse(words);
       } catch (const CLI::ParseError& error) {
         throw InputError({parts_.front()}, error.what());
       }

@@ -273,7 +273,7 @@ class Rejection {
 
   bool is_done() const { return measured_.size() == types_.size(); }
 
-  // Tells how much of the current method is done; false if interrupted.
+  // Shows how much of the current method is done; false if interrupted.
   bool go_on(double part) const {
     if (progress_)
       progress_((static_cast<double>(measured_.size()) + part) /

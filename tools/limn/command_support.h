@@ -65,7 +65,7 @@ std::string with_ending(const std::string& output, const std::string& ending);
 void check_output(const std::string& file);
 void write_json(const std::string& file, const std::string& text);  // nothing for ""
 void copy_json(const std::string& from, const std::string& to);     // likewise
-// Bytes that can be taken without paging, as the system tells; 0 if it does not.
+// Bytes that can be taken without paging, as the system reports; 0 if it does not.
 double available_memory();
 // "a,b" of --terms; none for "".
 std::vector<std::string> parse_terms(const std::string& list);
@@ -73,11 +73,11 @@ std::vector<std::string> parse_terms(const std::string& list);
 std::optional<SampleCounts> parse_samples(const std::string& list);
 // "X,Y,S", or "TERM,N" for a term's samples on the film.
 NonFinite::SampleId parse_place(const std::string& text);
-// What is told once on standard error and again under "warnings" of --json, by every command whose
-// result it concerns.
+// What is printed once on standard error and again under "warnings" of --json, by every command
+// whose result it concerns.
 class Warnings {
  public:
-  // A whole line, as read_scene() makes them; nothing if it was told before.
+  // A whole line, as read_scene() makes them; nothing if it was printed before.
   void add(const std::string& line);
   // Texts without the word "warning".
   void add_all(const std::vector<std::string>& texts);

@@ -1,5 +1,5 @@
 #pragma once
-// The folder of a fit: what was asked, state, history, snapshots.
+// The folder of a fit: its options, state, history, snapshots.
 //
 //   fit.json        arguments, history, snapshots, status: for reports, and for --resume
 //   state.cbor      all numbers that a later step depends on
@@ -54,8 +54,8 @@ class FitFolder {
     arguments_.spp = spp;
     arguments_.seed = seed;
   }
-  // Makes the folder, and notes what tells the scenes apart; InputError if it holds a fit already,
-  // or cannot be written, or a file that the fit reads lies in its place.
+  // Makes the folder, and notes what distinguishes the scenes; InputError if it holds a fit
+  // already, or cannot be written, or a file that the fit reads lies in its place.
   void prepare(const std::vector<FitView>& views);
   // InputError where what the views were read from is not as it was when the fit began.
   void check_inputs(const std::vector<FitView>& views) const;

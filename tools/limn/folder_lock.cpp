@@ -1,4 +1,4 @@
-// A file in the folder under flock(2), which tells whose it is.
+// A file in the folder under flock(2), which says whose it is.
 #include "tools/limn/folder_lock.h"
 
 #include <fcntl.h>

@@ -11,18 +11,18 @@ namespace limn {
 // --part
 void add_part_option(CLI::App& app, CommonOptions& common);
 
-// What was asked for, as it is kept in a part.
+// The command, as it is kept in a part.
 struct PartRequest {
   std::string command;
   std::vector<std::string> words;  // after the command's name, without -o, --part and what only
-                                   // changes how a run is told of or how fast it is
+                                   // changes how a run is reported or how fast it is
   std::string line;                // as typed, for a shell
 };
 std::string to_text(const PartRequest& request);
 // InputError that names `file` if it is not one.
 PartRequest parse_request(const std::string& text, const std::string& file);
 
-// Makes the part that common.part asks for, into `output`, which must end in .part. inputs: files
+// Makes the part that common.part states, into `output`, which must end in .part. inputs: files
 // that are read beside those of the scene. run: the run with these settings; returns what was not
 // finite. Returns the command's status.
 int run_part(const CommonOptions& common, const Scene& scene,

@@ -12,7 +12,7 @@ const std::atomic<bool>& interrupt_flag();
 void watch_interrupt();
 
 // A progress callback that redraws one line on standard error; does nothing unless that is a
-// terminal and not `quiet`. What is left is told once it can be known: after three seconds and a
+// terminal and not `quiet`. What is left is shown once it can be known: after three seconds and a
 // hundredth.
 std::function<void(double)> progress_bar(const std::string& label, bool quiet);
 // Before other text: takes away the line of progress, which may be half of it.

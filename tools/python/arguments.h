@@ -39,7 +39,7 @@ class Arguments {
            const char* help = "") {
     add({name, type, standard, help, [&value](nb::handle given) { value = nb::cast<T>(given); }});
   }
-  // As earlier versions called it: InputError that tells what to write instead.
+  // As earlier versions called it: InputError that says what to write instead.
   void add_former(const char* name, const char* instead);
   // What follows is given by its name alone.
   void end_positional() { positional_ = list_.size(); }
@@ -127,7 +127,7 @@ inline constexpr const char* kNamesOrNoneType = "str | collections.abc.Sequence[
 inline constexpr const char* kArrayType = "numpy.typing.ArrayLike";
 inline constexpr const char* kArrayOrNoneType = "numpy.typing.ArrayLike | None";
 
-// Binds a function by the struct of a call: `take(Arguments&)` tells what it takes, and
+// Binds a function by the struct of a call: `take(Arguments&)` says what it takes, and
 // `run(const Arguments&)` computes the result.
 template <class Call, class Module>
 void def(Module& m, const char* name, const char* result, const std::string& about) {

@@ -1,6 +1,6 @@
 #pragma once
 // What the groups of bindings share. This folder is the one door to nanobind; it holds no logic:
-// what has to be computed is asked of limn/...
+// all is computed by limn/...
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/function.h>
@@ -109,7 +109,7 @@ std::vector<std::string> to_list(const Names& names);
 void run_job(RunSettings settings, const nb::object& progress,
              const std::function<void(const RunSettings&)>& job);
 
-// Tells Python's warnings.
+// Issues Python's warnings.
 void warn_all(const std::vector<std::string>& warnings);
 // Raises limn.NonFiniteError, which carries the result, if there is a reason to.
 void check_finite(const NonFinite& bad, const nb::object& result);

@@ -18,10 +18,10 @@ struct Check {
 Check check_of(const SceneHandle& handle, const CheckOptions& options, const RunRequest& request,
                const nb::object& progress) {
   const auto scene = handle.share();
-  const RunSettings asked = settings_of(request, *scene);
-  if (asked.spp < 2) throw InputError("check needs spp of at least 2, for standard errors");
+  const RunSettings requested = settings_of(request, *scene);
+  if (requested.spp < 2) throw InputError("check needs spp of at least 2, for standard errors");
   Check check;
-  run_job(asked, progress, [&](const RunSettings& settings) {
+  run_job(requested, progress, [&](const RunSettings& settings) {
     check.result = limn::check(*scene, options, settings);
   });
   CheckResult& r = check.result;

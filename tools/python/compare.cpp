@@ -172,7 +172,7 @@ void bind_compare(nb::module_& m) {
             }
             return views;
           },
-          "One limn.ComparedMethod each, in the order asked for.");
+          "One limn.ComparedMethod each, in the order requested.");
   def<CompareCall>(m, "compare", "Comparison",
                    "Derivative images of several methods at equal time against one long run.\n\n"
                    "aux, kappa and film are for the methods that take them; references have their "

@@ -51,10 +51,10 @@ class Worker {
 };
 
 // Signals and progress, with the GIL held; throws what Python raises.
-void attend(const nb::object& progress, double done, double& told) {
+void attend(const nb::object& progress, double done, double& shown) {
   if (PyErr_CheckSignals() != 0) throw nb::python_error();
-  if (progress.is_none() || done <= told) return;
-  told = done;
+  if (progress.is_none() || done <= shown) return;
+  shown = done;
   progress(done);
 }
 
@@ -67,10 +67,10 @@ void run_job(RunSettings settings, const nb::object& progress,
   settings.interrupted = &interrupted;
   settings.progress = [&done](double fraction) { done = fraction; };
   std::optional<nb::python_error> raised;
-  double told = 0;
+  double shown = 0;
   const auto look = [&] {
     try {
-      attend(progress, done, told);
+      attend(progress, done, shown);
     } catch (nb::python_error& error) {
       raised.emplace(std::move(error));
       interrupted = true;

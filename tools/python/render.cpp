@@ -20,7 +20,7 @@ Estimate to_estimate(const Moments& moments, const Film& film, int64_t spp, doub
 
 namespace {
 
-// numpy's protocol: the values themselves unless another type or a copy is asked for.
+// numpy's protocol: the values themselves unless another type or a copy is requested.
 nb::object to_numpy(const Estimate& e, const nb::object& dtype, const nb::object& copy) {
   nb::object value = nb::cast(e.value);
   if (!dtype.is_none()) value = value.attr("astype")(dtype, nb::arg("copy") = false);

@@ -275,10 +275,9 @@ nb::class_<SceneHandle> bind_scene(nb::module_& m) {
           "Ids of the sensors of the file, \"\" where it gives none; the first is the scene's, "
           "see view().")
       .def_prop_ro("shapes", shape_ids, "Ids of all shapes, \"\" where the file gives none.")
-      .def_prop_rw(
-          "shading", shading_name, set_shading,
-          "How interpolated normals shade: \"continuous\", or \"mitsuba\", whose jumps are "
-          "missing from gradients.")
+      .def_prop_rw("shading", shading_name, set_shading,
+                   "How interpolated normals shade: \"continuous\", or \"mitsuba\", whose "
+                   "discontinuities are missing from gradients.")
       .def("__repr__", repr);
   m.def("load", load, nb::arg("file"), nb::kw_only(), nb::arg("smooth_as") = 0.0,
         nb::arg("substitutions"),

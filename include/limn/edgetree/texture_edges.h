@@ -1,5 +1,5 @@
 #pragma once
-// Edges inside of faces: where the texture of a surface jumps.
+// Edges inside of faces: where the texture of a surface is discontinuous.
 #include <span>
 #include <vector>
 

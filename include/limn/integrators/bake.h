@@ -33,7 +33,7 @@ class BakedView {
   // As `render` with the method lines:azimuths=uniform sees the scene. InputError where that does
   // not support the scene (max_depth other than 2, textures, gloss, delta lights, other sensors
   // than pinholes), and for scenes without an environment. lines: as RenderOptions.
-  // An interrupted run keeps nothing: `complete` tells.
+  // An interrupted run keeps nothing, see `complete`.
   struct Made;
   static Made make(const Scene& scene, const RunSettings& settings, int lines);
 

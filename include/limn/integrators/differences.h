@@ -37,7 +37,7 @@ struct CentralDifferences {
   NonFinite non_finite;
 };
 // All jobs and steps share their random numbers. even: these are even in each batch (Rng::even),
-// for less error, mostly. What `check` tells of steps and of rare events is of independent ones.
+// for less error, mostly. What `check` states of steps and of rare events is of independent ones.
 // blur: of images of blurred faces, as resolved() has it.
 CentralDifferences central_differences(const Scene& scene, const std::vector<DifferenceJob>& jobs,
                                        int block, const RunSettings& settings, bool even = false,

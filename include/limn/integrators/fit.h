@@ -107,7 +107,7 @@ struct FitRecord {
 struct FitScalar {
   std::string name, unit;
   double value = 0;
-  std::string parameter;  // that it belongs to, as it was asked for
+  std::string parameter;  // that it belongs to, as it was requested
 };
 
 // All that a later step depends on, besides what the Fit was made from.

@@ -37,7 +37,7 @@ inline constexpr Option kPyramidOption{
     "the levels",
     1, 32};
 
-// What is asked of a run; the scene's file says the rest.
+// What a run is to do; the scene's file says the rest.
 struct RunRequest {
   std::optional<int> spp;
   std::optional<uint64_t> seed;

@@ -71,7 +71,7 @@ class PartFile;
 // InputError if the file cannot be written, or holds another part or one of another run.
 class PartWriter final : public BatchStore {
  public:
-  // arguments: what was asked for, one line, for who joins the parts. file "": in memory.
+  // arguments: the command's, one line, for who joins the parts. file "": in memory.
   PartWriter(Part part, std::string arguments, std::string file);
   PartWriter(const PartWriter&) = delete;
   PartWriter& operator=(const PartWriter&) = delete;
@@ -112,7 +112,7 @@ class PartReader final : public BatchStore {
   PartReader& operator=(const PartReader&) = delete;
   ~PartReader() override;
 
-  // What was asked for.
+  // The command's, one line.
   const std::string& arguments() const;
 
   void start(int spp) override;

@@ -187,7 +187,7 @@ class _Writer:
         self.line(place, f"</{tag}>")
 
     def entries(self, place: str, what: Mapping[str, Any], known: Sequence[str]) -> None:
-        """All but the known ones. Errors of each are kept, so that one call tells all."""
+        """All but the known ones. Errors of each are kept, so that one call reports all."""
         for key, value in what.items():
             if key in known:
                 continue
@@ -315,12 +315,12 @@ def _load(scene: Mapping[str, Any], writer: _Writer) -> Scene:
             r"[^\s\"]*string:(\d+)(:\d+)?", lambda m: writer.places[int(m.group(1)) - 1], text
         )
 
-    with warnings.catch_warnings(record=True) as told:
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:
             read = load_string("\n".join(writer.lines), writer.folder)
         except InputError as error:
             raise type(error)(placed(str(error))) from None
-    for warning in told:
+    for warning in caught:
         warnings.warn(placed(str(warning.message)), stacklevel=3)
     return read

@@ -84,7 +84,7 @@ class Motions:
         return scene
 
     def names_for(self, wanted: list[str]) -> list[str]:
-        """What limn.backward is asked for, so that `slope` knows all of these."""
+        """What limn.backward is to differentiate, so that `slope` knows all of these."""
         names = list(wanted)
         for name in wanted:
             owner = self.split(name)[0] if name in self.steps else None

@@ -18,7 +18,7 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
 
 @dataclass(frozen=True)
 class Part:
-    """Part `k` of `n` of a run: what was asked for, and the sums of its batches. It pickles."""
+    """Part `k` of `n` of a run: what it computes, and the sums of its batches. It pickles."""
 
     k: int
     n: int

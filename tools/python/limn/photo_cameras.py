@@ -250,13 +250,13 @@ def read_transforms(file: str) -> list[Camera]:
     """The cameras of a transforms.json, as radiance fields use it."""
     try:
         with open(file, encoding="utf-8") as stream:
-            told = json.load(stream)
+            read = json.load(stream)
     except (OSError, ValueError) as error:
         raise InputError(f"{file}: error: cannot be read as JSON: {error}") from None
-    frames = told.get("frames") if isinstance(told, dict) else None
+    frames = read.get("frames") if isinstance(read, dict) else None
     if not isinstance(frames, list) or not all(isinstance(f, dict) for f in frames):
         raise InputError(f"{file}: error: has no list of frames")
-    return [_frame({**told, **f}, f"{file}: frame {i}") for i, f in enumerate(frames)]
+    return [_frame({**read, **f}, f"{file}: frame {i}") for i, f in enumerate(frames)]
 
 
 def _places(folder: str) -> list[str]:
@@ -268,7 +268,7 @@ def _places(folder: str) -> list[str]:
 
 
 def read_cameras(folder: str) -> tuple[list[Camera], str]:
-    """The cameras that a folder tells of, and the file or folder that tells it."""
+    """The cameras that a folder describes, and the file or folder that does."""
     if not os.path.isdir(folder):
         raise InputError(f"{folder}: error: no such folder")
     for name in ("transforms.json", "transforms_train.json"):

@@ -71,7 +71,7 @@ class Plan:
 
 @dataclass
 class Progress:
-    """What a fit tells of each step: its number, the losses, and how far it is, in [0, 1]."""
+    """What a fit reports of each step: its number, the losses, and how far it is, in [0, 1]."""
 
     step: int
     loss: float
@@ -114,7 +114,7 @@ def pixel_weights(view: View) -> Any:
     A sensor's variance grows with brightness, so that a pixel counts by 1 / (brightness + 0.1).
     """
     whole = (view.mask <= 0.001) | (view.mask >= 0.999)
-    # A pixel that touches the border of the mask is told by the mask alone.
+    # A pixel that touches the border of the mask is judged by the mask alone.
     near = np.zeros_like(whole)
     for axis in (0, 1):
         for shift in (1, -1):
@@ -224,12 +224,12 @@ class PhotoFit:
                 mover.move(all_losses, fraction)
                 update(lit, flat, self.model)
                 done, self.steps = done + 1, self.steps + 1
-                told = Progress(self.steps, float(np.mean([x.photograph for x in all_losses])),
+                progress = Progress(self.steps, float(np.mean([x.photograph for x in all_losses])),
                                 float(np.mean([x.mask for x in all_losses])), fraction,
                                 stage)  # fmt: skip
-                self.history.append(told)
+                self.history.append(progress)
                 if tell:
-                    tell(told)
+                    tell(progress)
 
     def _move_camera(self, i: int, found: Losses, plan: Plan, shrink: float) -> None:
         """Half a Gauss-Newton step; curvature from the photograph (Lucas and Kanade 1981).

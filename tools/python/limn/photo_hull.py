@@ -1,4 +1,4 @@
-"""The visual hull of masks: a first shape, and what tells whether cameras and masks agree."""
+"""The visual hull of masks: a first shape, and a test of whether cameras and masks agree."""
 
 from __future__ import annotations
 
@@ -103,10 +103,10 @@ def _with_pose(view: View, pose: Any) -> View:
                 pose)  # fmt: skip
 
 
-def checked(views: list[View], told: str) -> list[View]:
+def checked(views: list[View], source: str) -> list[View]:
     """The views whose cameras and masks agree; warns of those that do not, by their files.
 
-    told: the file of the cameras, for limn.InputError where none agree.
+    source: the file of the cameras, for limn.InputError where none agree.
     """
     views, most = list(views), max(1, len(views) // 4)
     for left in range(most, -1, -1):
@@ -115,7 +115,7 @@ def checked(views: list[View], told: str) -> list[View]:
             return views
         for what, mend in _MISTAKES:
             if _agreement([_with_pose(v, mend(v.pose)) for v in views]).min() >= _AGREES:
-                raise InputError(f"{told}: error: the cameras are {what}")
+                raise InputError(f"{source}: error: the cameras are {what}")
         if left == 0 or len(views) < 4:
             break
         without = [_agreement(views[:i] + views[i + 1 :]).mean() for i in range(len(views))]
@@ -133,7 +133,7 @@ def checked(views: list[View], told: str) -> list[View]:
             stacklevel=2,
         )
     raise InputError(
-        f"{told}: error: cameras and masks do not agree: what is inside of all masks covers only "
+        f"{source}: error: cameras and masks do not agree: what is inside of all masks covers only "
         f"{agrees.mean():.0%} of them; check poses, axes and that each mask is of its photograph"
     )
 

@@ -18,7 +18,7 @@ IMAGES = (".png", ".jpg", ".jpeg", ".exr")
 _MOST_SAMPLES = 8  # a side, per pixel, of a photograph that is made smaller; not tuned
 _BLACK = 0.002  # linear: below half of the least step of eight bits in sRGB, but for noise
 _HOLE = 0.02  # of a mask's area: a smaller hole is filled
-_CLIPPED = 0.995  # linear; a channel from here on tells no more than that it is bright
+_CLIPPED = 0.995  # linear; a channel from here on says no more than that it is bright
 
 
 @dataclass
@@ -26,7 +26,7 @@ class View:
     """A photograph as a fit uses it, by a pinhole with square pixels.
 
     image: linear radiance, premultiplied by the mask, (H, W, 3). mask: coverage, (H, W). known: 1
-    where the photograph tells what the camera saw, (H, W): inside of its border, not clipped.
+    where the photograph shows what the camera saw, (H, W): inside of its border, not clipped.
     focal and center in pixels; pose: camera to world, +X right, +Y down, +Z along the view.
     """
 
@@ -194,7 +194,7 @@ def _holes(mask: Any) -> list[Any]:
 
 
 def _mended(mask: Any, file: str) -> Any:
-    """The mask without small holes; each hole is told."""
+    """The mask without small holes; each hole is reported."""
     area = float(mask.sum())
     for hole in _holes(mask):
         rows, columns = np.nonzero(hole)
@@ -225,7 +225,7 @@ def _load(base: str, camera: Camera, size: int) -> View | None:
     camera = _scaled(camera, file, width, height)
     mask_file = _mask_file(base, file, camera)
     mask = _read_mask(mask_file) if mask_file else read_alpha(file)
-    told = mask_file or file
+    source = mask_file or file
     if mask is None:
         raise InputError(
             f"{file}: error: has no mask: give it an alpha channel, or put "
@@ -233,19 +233,19 @@ def _load(base: str, camera: Camera, size: int) -> View | None:
         )
     if mask.shape != (height, width):
         raise InputError(
-            f"{told}: error: the mask has {mask.shape[1]} x {mask.shape[0]} pixels, its photograph "
+            f"{source}: error: the mask has {mask.shape[1]} x {mask.shape[0]} pixels, its photograph "
             f"{width} x {height}"
         )
     clipped: Any = (image >= _CLIPPED).any(axis=2) & (not file.lower().endswith(".exr"))
     layers = np.concatenate([image * mask[..., None], mask[..., None], clipped[..., None]], axis=2)
     pixels, known, focal, center = _resampled(camera, layers, size)
     given = np.clip(pixels[..., 3], 0, 1)
-    mask = _mended(given, told)
+    mask = _mended(given, source)
     # A hole that is filled may be a true one, and its colours are gone: other views tell.
     known = known & (pixels[..., 4] == 0) & (mask == given)
     if not (mask > 0.5).any() or (mask[known] > 0.5).all():
         what = "empty" if not (mask > 0.5).any() else "white everywhere"
-        warnings.warn(f"{told}: the mask is {what}: the view is left out", stacklevel=2)
+        warnings.warn(f"{source}: the mask is {what}: the view is left out", stacklevel=2)
         return None
     if pixels[..., :3][mask > 0.5].mean() < _BLACK:
         warnings.warn(f"{file}: the photograph is black: the view is left out", stacklevel=2)
@@ -259,12 +259,12 @@ def read_views(folder: str, size: int) -> list[View]:
     Warns of views that are left out and of masks with holes; raises limn.InputError where fewer
     than three views are left.
     """
-    cameras, told = read_cameras(folder)
-    base = os.path.dirname(told) if os.path.isfile(told) else folder
+    cameras, source = read_cameras(folder)
+    base = os.path.dirname(source) if os.path.isfile(source) else folder
     views = [v for v in (_load(base, c, size) for c in cameras) if v is not None]
     if len(views) < 3:
         raise InputError(
-            f"{told}: error: {len(views)} usable photographs of {len(cameras)}: at least 3 are "
+            f"{source}: error: {len(views)} usable photographs of {len(cameras)}: at least 3 are "
             "needed"
         )
     return sorted(views, key=lambda v: v.name)

@@ -1,12 +1,12 @@
-// Which textures jump where.
-#include "integrators/edges/texture_jumps.h"
+// Which textures are discontinuous where.
+#include "integrators/edges/texture_discontinuities.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "integrators/edges/face_jumps.h"
+#include "integrators/edges/face_discontinuities.h"
 #include "limn/core/duplicate_faces.h"
 #include "limn/core/names.h"
 
@@ -28,19 +28,19 @@ bool is_near(const std::array<double, 2>& a, const std::array<double, 2>& b) {
 }
 
 // Lines that two textures have in common.
-void leave_out_copies(std::vector<Texture::Jump>& jumps) {
+void leave_out_copies(std::vector<Texture::Jump>& lines) {
   std::vector<Texture::Jump> kept;
-  for (const Texture::Jump& jump : jumps) {
+  for (const Texture::Jump& line : lines) {
     const bool known = std::any_of(kept.begin(), kept.end(), [&](const Texture::Jump& other) {
-      return (is_near(jump.from, other.from) && is_near(jump.to, other.to)) ||
-             (is_near(jump.from, other.to) && is_near(jump.to, other.from));
+      return (is_near(line.from, other.from) && is_near(line.to, other.to)) ||
+             (is_near(line.from, other.to) && is_near(line.to, other.from));
     });
-    if (!known) kept.push_back(jump);
+    if (!known) kept.push_back(line);
   }
-  jumps = std::move(kept);
+  lines = std::move(kept);
 }
 
-// Attributes of vertices jump at most where these are stored more than once.
+// Attributes of vertices are discontinuous at most where these are stored more than once.
 void mark_copies(const Mesh& mesh, TextureSeams& seams) {
   std::vector<uint8_t> has_copies(mesh.positions.size());
   for (uint32_t v = 0; v < mesh.weld.size(); ++v) {
@@ -57,13 +57,13 @@ void mark_copies(const Mesh& mesh, TextureSeams& seams) {
 
 }  // namespace
 
-TextureJumps::TextureJumps(const Scene& scene) {
+TextureDiscontinuities::TextureDiscontinuities(const Scene& scene) {
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
     if (scene.shapes[s].mesh.textured) look_at(scene, ShapeId(s));
   }
 }
 
-void TextureJumps::look_at(const Scene& scene, ShapeId id) {
+void TextureDiscontinuities::look_at(const Scene& scene, ShapeId id) {
   const Shape& shape = scene.shape(id);
   const Mesh& mesh = shape.mesh;
   shapes_.resize(scene.shapes.size());
@@ -93,56 +93,56 @@ void TextureJumps::look_at(const Scene& scene, ShapeId id) {
   }
 }
 
-bool TextureJumps::add_face(const std::vector<const Texture*>& textures, const Mesh& mesh,
-                            FaceId face, OfShape& result) {
-  Texture::Jumps jumps;
-  size_t of_one = 0;  // how many textures jump
+bool TextureDiscontinuities::add_face(const std::vector<const Texture*>& textures, const Mesh& mesh,
+                                      FaceId face, OfShape& result) {
+  Texture::Jumps lines;
+  size_t of_one = 0;  // how many textures are discontinuous
   for (const Texture* texture : textures) {
-    const size_t before = jumps.inside.size();
-    if (!add_face_jumps(*texture, mesh, face, kMost - std::min(count_, kMost), jumps)) {
+    const size_t before = lines.inside.size();
+    if (!add_face_discontinuities(*texture, mesh, face, kMost - std::min(count_, kMost), lines)) {
       count_ = kMost + 1;
       return false;
     }
-    of_one += jumps.inside.size() > before;
+    of_one += lines.inside.size() > before;
   }
-  if (of_one > 1) leave_out_copies(jumps.inside);
-  result.seams.sides[face.index()] |= jumps.sides;
-  for (const Texture::Jump& jump : jumps.inside) {
-    result.segments.push_back({face, jump.from, jump.to});
+  if (of_one > 1) leave_out_copies(lines.inside);
+  result.seams.sides[face.index()] |= lines.sides;
+  for (const Texture::Jump& line : lines.inside) {
+    result.segments.push_back({face, line.from, line.to});
   }
-  count_ += jumps.inside.size();
+  count_ += lines.inside.size();
   return true;
 }
 
-const TextureSeams* TextureJumps::seams(ShapeId shape) const {
+const TextureSeams* TextureDiscontinuities::seams(ShapeId shape) const {
   if (shapes_.empty() || !shapes_[shape.index()].has_seams) return nullptr;
   return &shapes_[shape.index()].seams;
 }
 
-std::span<const FaceSegment> TextureJumps::segments(ShapeId shape) const {
+std::span<const FaceSegment> TextureDiscontinuities::segments(ShapeId shape) const {
   if (shapes_.empty()) return {};
   return shapes_[shape.index()].segments;
 }
 
 void check_texture_edges(const Scene& scene, std::vector<std::string>& warnings) {
-  const TextureJumps jumps(scene);
-  if (jumps.first_without().valid()) {
+  const TextureDiscontinuities lines(scene);
+  if (lines.first_without().valid()) {
     throw InputError(
-        scene.shape(jumps.first_without()).where,
-        fmt::format("{}: its texture jumps along more than {} edges in all, which derivatives with "
-                    "respect to what moves need: scale to_uv by less",
-                    quoted_name(scene, jumps.first_without()), TextureJumps::kMost));
+        scene.shape(lines.first_without()).where,
+        fmt::format("{}: its texture is discontinuous along more than {} edges in all, which "
+                    "derivatives with respect to what moves need: scale to_uv by less",
+                    quoted_name(scene, lines.first_without()), TextureDiscontinuities::kMost));
   }
-  if (jumps.with_meridian().empty()) return;
+  if (lines.with_meridian().empty()) return;
   std::vector<std::string> names;
-  for (const ShapeId shape : jumps.with_meridian()) names.push_back(quoted_name(scene, shape));
+  for (const ShapeId shape : lines.with_meridian()) names.push_back(quoted_name(scene, shape));
   constexpr size_t kMostNames = 8;
   const size_t more = names.size() > kMostNames ? names.size() - kMostNames : 0;
   names.resize(names.size() - more);
   warnings.push_back(fmt::format(
-      "derivatives with respect to what moves are incomplete: the textures of {}{} jump where the "
-      "angle of a sphere or disk comes back to its beginning, which is no edge (where to_uv has "
-      "whole numbers they do not)",
+      "derivatives with respect to what moves are incomplete: the textures of {}{} are "
+      "discontinuous where the angle of a sphere or disk comes back to its beginning, which is no "
+      "edge (where to_uv has whole numbers they are continuous)",
       join(names), more > 0 ? fmt::format(" and {} more", more) : ""));
 }
 

@@ -1,5 +1,5 @@
 // Faces are cut in four until texture coordinates are linear over each part.
-#include "integrators/edges/face_jumps.h"
+#include "integrators/edges/face_discontinuities.h"
 
 #include <algorithm>
 #include <cmath>
@@ -21,8 +21,8 @@ using Part = std::array<Point, 3>;
 class CurvedFace {
  public:
   CurvedFace(const Texture& texture, const Mesh& mesh, FaceId face, size_t most,
-             Texture::Jumps& jumps)
-      : texture_(texture), mesh_(mesh), face_(face), most_(most), jumps_(jumps) {
+             Texture::Jumps& lines)
+      : texture_(texture), mesh_(mesh), face_(face), most_(most), lines_(lines) {
     angle_ = mesh.uv_source == UvSource::kSphere ? 0 : 1;
     turn_ = uv({1.0 / 3, 1.0 / 3})[angle_];
     for (int k = 0; k < 3; ++k) {
@@ -33,7 +33,7 @@ class CurvedFace {
 
   bool add() {
     const auto sides = add({at(kCorners[0]), at(kCorners[1]), at(kCorners[2])}, 0);
-    if (sides) jumps_.sides |= *sides;
+    if (sides) lines_.sides |= *sides;
     return sides.has_value();
   }
 
@@ -61,7 +61,7 @@ class CurvedFace {
     return std::ldexp(most, -cuts);
   }
 
-  // Returns the sides along which it jumps; nothing if there are too many jumps.
+  // Returns the sides along which it is discontinuous; nothing if there are too many lines.
   std::optional<uint8_t> add(Part part, int cuts) {
     // A pole has no angle: it takes the mean of the others.
     for (int k = 0; k < 3; ++k) {
@@ -81,10 +81,10 @@ class CurvedFace {
       }
       return b;
     };
-    for (const Texture::Jump& jump : found.inside) {
-      jumps_.inside.push_back({on_face(jump.from), on_face(jump.to)});
+    for (const Texture::Jump& line : found.inside) {
+      lines_.inside.push_back({on_face(line.from), on_face(line.to)});
     }
-    if (jumps_.inside.size() > most_) return {};
+    if (lines_.inside.size() > most_) return {};
     return found.sides;
   }
 
@@ -101,7 +101,7 @@ class CurvedFace {
       if ((*outer & 4) == 0) sides &= ~(1 << before);
       // The cut between both parts, of the inner one the side from middle `before` to middle k.
       if ((*outer & 2) != 0 || (*inner >> before & 1) != 0)
-        jumps_.inside.push_back({middles[before].b, middles[k].b});
+        lines_.inside.push_back({middles[before].b, middles[k].b});
     }
     return sides;
   }
@@ -110,7 +110,7 @@ class CurvedFace {
   const Mesh& mesh_;
   FaceId face_;
   size_t most_;
-  Texture::Jumps& jumps_;
+  Texture::Jumps& lines_;
   int angle_;
   double turn_;               // of the middle
   std::optional<Pair> pole_;  // a corner on the axis
@@ -118,16 +118,16 @@ class CurvedFace {
 
 }  // namespace
 
-bool add_face_jumps(const Texture& texture, const Mesh& mesh, FaceId face, size_t most,
-                    Texture::Jumps& jumps) {
-  if (mesh.uv_source != UvSource::kPlane) return CurvedFace(texture, mesh, face, most, jumps).add();
+bool add_face_discontinuities(const Texture& texture, const Mesh& mesh, FaceId face, size_t most,
+                              Texture::Jumps& lines) {
+  if (mesh.uv_source != UvSource::kPlane) return CurvedFace(texture, mesh, face, most, lines).add();
   const FaceIndices& ids = mesh.uv_ids[face.index()];
   std::array<Pair, 3> uv;
   for (int k = 0; k < 3; ++k) {
     const Vec3f& place = mesh.uv_places[ids[k]];
     uv[k] = {place.x, place.y};
   }
-  return texture.add_jumps(uv, most, jumps);
+  return texture.add_jumps(uv, most, lines);
 }
 
 }  // namespace limn

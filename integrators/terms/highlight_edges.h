@@ -14,11 +14,11 @@
 
 namespace limn {
 
-class GlareEdges {
+class HighlightEdges {
  public:
   // All must outlive it. mirrored: not null.
-  GlareEdges(const Scene& scene, const EdgeSamplerInput& edges, const EdgeSampler& sampler,
-             const MirroredLight& mirrored);
+  HighlightEdges(const Scene& scene, const EdgeSamplerInput& edges, const EdgeSampler& sampler,
+                 const MirroredLight& mirrored);
 
   // What one point sees.
   struct View {
@@ -36,10 +36,10 @@ class GlareEdges {
 
  private:
   // Adds a piece of the cap that is next in the view, halved around its brightest point until its
-  // directions are as close together as `narrow`. elsewhere: luminance beside the glare.
-  void add_pieces(const EdgeQuery& query, const MirroredLight::Glare& glare, double elsewhere,
-                  EdgePiece piece, double narrow, View& view) const;
-  // Whether the edge is between two faces that the point sees, one of which may show glare.
+  // directions are as close together as `narrow`. elsewhere: luminance beside the highlight.
+  void add_pieces(const EdgeQuery& query, const MirroredLight::Highlight& highlight,
+                  double elsewhere, EdgePiece piece, double narrow, View& view) const;
+  // Whether the edge is between two faces that the point sees, one of which may show a highlight.
   bool is_of_gloss(EdgeRef edge, const Vec3d& p) const;
   Vec3d position(EdgeRef edge, double t) const;
   Vec3d direction(const EdgeQuery& query, const EdgeSample& sample) const;

@@ -1,5 +1,5 @@
 #pragma once
-// Where the textures of a scene jump (are discontinuous): inside of faces, and at edges of meshes.
+// Where the textures of a scene are discontinuous: inside of faces, and at edges of meshes.
 #include <span>
 #include <string>
 #include <vector>
@@ -9,12 +9,12 @@
 
 namespace limn {
 
-class TextureJumps {
+class TextureDiscontinuities {
  public:
   // Looks at the faces of textured shapes; nothing is done for others.
-  explicit TextureJumps(const Scene& scene);
+  explicit TextureDiscontinuities(const Scene& scene);
 
-  // Null where the shape's textures jump at no edge of the mesh.
+  // Null where the shape's textures are continuous at all edges of the mesh.
   const TextureSeams* seams(ShapeId shape) const;
   // By faces; those of two textures that coincide once.
   std::span<const FaceSegment> segments(ShapeId shape) const;
@@ -23,8 +23,8 @@ class TextureJumps {
   static constexpr size_t kMost = 1000000;
   // The first shape that lacks segments, if any.
   ShapeId first_without() const { return first_without_; }
-  // Spheres and disks whose textures jump where an angle comes back to its beginning: along a
-  // meridian that is not found.
+  // Spheres and disks whose textures are discontinuous where an angle comes back to its beginning:
+  // along a meridian that is not found.
   const std::vector<ShapeId>& with_meridian() const { return with_meridian_; }
 
  private:
@@ -44,8 +44,8 @@ class TextureJumps {
   ShapeId first_without_ = ShapeId::none();
 };
 
-// InputError if there are more than TextureJumps::kMost segments. Adds one warning that names the
-// shapes with such a meridian.
+// InputError if there are more than TextureDiscontinuities::kMost segments. Adds one warning that
+// names the shapes with such a meridian.
 void check_texture_edges(const Scene& scene, std::vector<std::string>& warnings);
 
 }  // namespace limn
