@@ -109,7 +109,8 @@ std::vector<MethodType> term_methods() {
   std::vector<MethodType> methods;
   methods.push_back(method_row("adaptive",
                                "silhouettes, with reparameterised directions and film samples, and "
-                               "samples allocated by error",
+                               "samples allocated by error; in reverse mode forest or "
+                               "silhouettes, and samples per term, as a pilot decides",
                                "silhouettes", {}, motion_settings(true)));
   methods.back().defaults = {Task::kGradient, Task::kCompare};
   methods.back().set_up = [gradients = methods.back().set_up](MethodType& to) {

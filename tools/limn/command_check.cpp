@@ -23,7 +23,7 @@ std::string two_digits(double value) {
   return fmt::format("{:.0f}", std::round(value / unit) * unit);
 }
 
-// What else to ask for where a run tells nothing.
+// What else to try where a run shows nothing.
 std::string advice(const CheckResult& r, double seconds) {
   const auto spp = static_cast<double>(r.spp);
   const double more = std::max(r.needed_spp / spp, 1.1);
@@ -60,7 +60,8 @@ void print_verdict(const CheckResult& r, double seconds) {
   } else if (r.verdict == Verdict::kAgree && r.is_zero()) {
     fmt::print("  agree: both are zero, without noise\n");
   } else if (r.verdict == Verdict::kAgree) {
-    fmt::print("  agree: an error of {} of the derivative would have shown\n", percent(r.within));
+    fmt::print("  agree: an error of {} of all terms' magnitudes would have shown\n",
+               percent(r.within));
   } else if (r.verdict == Verdict::kNotComplete) {
     fmt::print("  NOT COMPLETE: no error was found, but terms are missing (see the warning)\n");
   } else if (r.bends) {
@@ -70,12 +71,12 @@ void print_verdict(const CheckResult& r, double seconds) {
         "a light:\n  the gradient is the slope on one side, and differences are the mean of "
         "both\n");
   } else {
-    fmt::print("  CANNOT TELL: an error of {} of the derivative could have hidden: {}\n",
+    fmt::print("  CANNOT TELL: an error of {} of all terms' magnitudes could have hidden: {}\n",
                percent(r.within), advice(r, seconds));
   }
 }
 
-// Less is not told: it would read "1 times".
+// Less is not printed: it would read "1 times".
 constexpr double kToldWidening = 1.05;
 
 // "errors of 9 of 64 windows for rare events, up to 3.2 times; of the sum 1.4 times"
@@ -263,7 +264,7 @@ class CheckCommand final : public Command {
     return status;
   }
 
-  // The one that was asked for, else the default of reverse mode.
+  // The one requested, else the default of reverse mode.
   Method reverse_method() const {
     return app_->count("--method") > 0 ? options_.method : Method(Task::kBackward);
   }

@@ -346,7 +346,8 @@ void CompareCommand::add_options(CLI::App& app) {
       ->required()
       ->type_name("FOLDER");
   app.add_flag_callback(
-      "--no-report", [this] { command_.report = false; }, "Write no report.html");
+      "--no-report", [this] { command_.report = false; },
+      "Write no report.html (--image writes none)");
 }
 
 void CompareCommand::check_images() {
