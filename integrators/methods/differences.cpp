@@ -35,6 +35,32 @@ std::vector<double> mean_of_two(const std::vector<double>& a, const std::vector<
   return mean;
 }
 
+// Appends the scene moved by each step of a job, forwards and back. Where only materials change
+// these draw the same directions.
+void append_moved(const Scene& scene, const DifferenceJob& job, std::vector<Scene>& moved) {
+  const Parameter parameter = find_parameter(scene, job.parameter);
+  const size_t first = moved.size();
+  for (const double step : job.steps) {
+    for (const double h : {step, -step}) moved.push_back(parameter.moved(scene, h));
+  }
+  if (moved_by({&parameter, 1}).any()) return;
+  const auto largest = std::max_element(job.steps.begin(), job.steps.end());
+  const size_t farthest = 2 * (largest - job.steps.begin());
+  draw_alike(std::span(moved).subspan(first), farthest, farthest + 1);
+}
+
+// images: of the scenes that append_moved() made for all jobs.
+void add_images(const std::vector<DifferenceJob>& jobs, const BatchSums* images, const Film& film,
+                int block, int samples, CentralDifferences& result) {
+  for (size_t j = 0; j < jobs.size(); ++j) {
+    for (size_t k = 0; k < jobs[j].combinations.size(); ++k) {
+      result.estimates[j][k].add_batch(combine(images, jobs[j].steps, jobs[j].combinations[k]),
+                                       film, block, samples);
+    }
+    images += 2 * jobs[j].steps.size();
+  }
+}
+
 }  // namespace
 
 DifferenceEstimate::DifferenceEstimate(const Film& film, int block)
@@ -59,16 +85,7 @@ CentralDifferences central_differences(const Scene& scene, const std::vector<Dif
   std::vector<Scene> moved;
   CentralDifferences result;
   for (const DifferenceJob& job : jobs) {
-    const Parameter parameter = find_parameter(scene, job.parameter);
-    const size_t first = moved.size();
-    for (const double step : job.steps) {
-      for (const double h : {step, -step}) moved.push_back(parameter.moved(scene, h));
-    }
-    if (!moved_by({&parameter, 1}).any()) {
-      const auto largest = std::max_element(job.steps.begin(), job.steps.end());
-      const size_t farthest = 2 * (largest - job.steps.begin());
-      draw_alike(std::span(moved).subspan(first), farthest, farthest + 1);
-    }
+    append_moved(scene, job, moved);
     result.estimates.emplace_back(job.combinations.size(), DifferenceEstimate(scene.film, block));
   }
   const auto at = [&](const auto& placed) {
@@ -107,14 +124,7 @@ CentralDifferences central_differences(const Scene& scene, const std::vector<Dif
         const BatchSums* images = sums.data();
         result.radiance.add_batch(mean_of_two(images[0].radiance, images[1].radiance),
                                   batch.count());
-        for (size_t j = 0; j < jobs.size(); ++j) {
-          for (size_t k = 0; k < jobs[j].combinations.size(); ++k) {
-            result.estimates[j][k].add_batch(
-                combine(images, jobs[j].steps, jobs[j].combinations[k]), scene.film, block,
-                batch.count());
-          }
-          images += 2 * jobs[j].steps.size();
-        }
+        add_images(jobs, images, scene.film, block, batch.count(), result);
         for (const BatchSums& s : sums) {
           result.cost.merge(s.costs[0]);
           result.non_finite.merge(s.non_finite);

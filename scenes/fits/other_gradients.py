@@ -17,6 +17,7 @@ import math
 import os
 import sys
 import time
+from collections import namedtuple
 
 import numpy as np
 
@@ -37,8 +38,13 @@ FITS = {
 VERTICES = "object.vertex_positions"
 
 
+# A fit: a scene file, the defines that make it the start, those of start and truth, sensors.
+Fit = namedtuple("Fit", "scene start defines views")
+
+
 class Limn:
-    def __init__(self, scene, start, defines, views, spp):
+    def __init__(self, fit, spp):
+        scene, start, defines, views = fit
         self.scenes = [limn.load(scene, **start, **defines).view(i) for i in range(views)]
         true = [limn.load(scene, **defines).view(i) for i in range(views)]
         self.targets = [limn.render(s, spp=256, seed=99, threads=1).value for s in true]
@@ -59,7 +65,8 @@ class Limn:
 
 
 class Mitsuba:
-    def __init__(self, mi, dr, scene, start, defines, views, spp, guiding):
+    def __init__(self, mi, dr, fit, spp, guiding):
+        scene, start, defines, views = fit
         self.mi, self.dr, self.views = mi, dr, views
         defines = {key: str(value) for key, value in defines.items()}
         true = mi.load_file(scene, optimize=False, **defines)
@@ -123,11 +130,11 @@ def main():
     positions, faces = np.array(mesh.positions), np.array(mesh.faces)
     true = limn.load(scene, **defines).mesh("object")
     size = float(np.linalg.norm(np.ptp(true.positions, axis=0)))
+    fit = Fit(scene, shape, defines, views)
     if arguments.gradients == "limn":
-        source = Limn(scene, shape, defines, views, arguments.spp or own)
+        source = Limn(fit, arguments.spp or own)
     else:
-        source = Mitsuba(mi, dr, scene, shape, defines, views, arguments.spp or other,
-                         arguments.guiding)  # fmt: skip
+        source = Mitsuba(mi, dr, fit, arguments.spp or other, arguments.guiding)
         dr.set_thread_count(1)  # before, loading waits for itself
 
     # Steps and smoothing of fits.py: 2 % and 10 % of the diagonal.

@@ -27,7 +27,7 @@ import numpy as np  # noqa: E402
 from common import read_json  # noqa: E402
 from stability_suite import (  # noqa: E402
     calibration, closed_form, families, statistics, suite, table, verdicts)
-from stability_suite.program import DEFAULT_METHODS, Program, method_names  # noqa: E402
+from stability_suite.program import DEFAULT_METHODS, Program, Task, method_names  # noqa: E402
 from stability_suite.statistics import Estimate  # noqa: E402
 
 STABILITY = os.path.join(TOOLS, "stability")
@@ -284,7 +284,8 @@ os.execv({LIMN!r}, [{LIMN!r}] + sys.argv[1:])
         scene, _ = families.find("scale").point(1)
         file = scene.write(os.path.join(self.folder, "scene"), 24)
         for method in ("adaptive", "li2019", "uniform", "forest"):
-            run = whole.gradient(file, scene.parameter, method, 0.02, 1, os.path.join(self.folder, "r"))
+            run = whole.gradient(Task(file, scene.parameter, method), 0.02, 1,
+                                 os.path.join(self.folder, "r"))
             statuses[method] = (run.status, run.message)
         self.assertEqual(statuses["adaptive"], ("done", ""))
         self.assertEqual(statuses["li2019"], ("crash", "SIGABRT: no output"))
@@ -300,8 +301,8 @@ class TestClosedForm(unittest.TestCase):
             scene = families.table(prism(bottom, 1), depth=2, parameter=parameter)
             truth = closed_form.derivative(scene, 12)
             with tempfile.TemporaryDirectory(prefix="limn_stability_") as folder:
-                run = BySamples(LIMN, 1).gradient(scene.write(folder, 12), parameter, "adaptive", 64,
-                                                  5, os.path.join(folder, "run"))
+                task = Task(scene.write(folder, 12), parameter, "adaptive")
+                run = BySamples(LIMN, 1).gradient(task, 64, 5, os.path.join(folder, "run"))
             with self.subTest(parameter=parameter):
                 self.assertGreater(statistics.bias([run.estimate], truth)["p"], 1e-4)
                 wrong = statistics.bias([run.estimate], truth.times(1.1))

@@ -7,6 +7,7 @@ import shutil
 import signal
 import subprocess
 import time
+from collections import namedtuple
 from dataclasses import dataclass, field
 
 import exr
@@ -15,7 +16,7 @@ import numpy as np
 from .statistics import Estimate
 
 DONE, REFUSED, NON_FINITE, CRASHED, TIMED_OUT = "done", "refused", "non-finite", "crash", "time-out"
-# Limn's methods in the suite: the one that the page asks about, and those that run by default.
+# Limn's methods in the suite: the one that the page is about, and those that run by default.
 OURS, DIFFERENCES, MITSUBA = "adaptive", "fd", "mitsuba"
 DEFAULT_METHODS = [OURS, "forest", "li2019", "uniform", DIFFERENCES]
 BAD_INPUT, NOT_FINITE = 2, 3  # limn's exit status
@@ -53,6 +54,10 @@ class Run:
     warnings: list = field(default_factory=list)
 
 
+# What a run computes. step: of finite differences; 0: the program's own.
+Task = namedtuple("Task", "scene_file parameter method step", defaults=(0,))
+
+
 class Program:
     """limn, and the processes of it that are running."""
 
@@ -70,19 +75,19 @@ class Program:
         """The options that say how long a run is."""
         return ["--time", f"{seconds:.6g}"]
 
-    def gradient(self, scene_file, parameter, method, seconds, seed, folder, step=0):
+    def gradient(self, task, seconds, seed, folder):
         """One run. folder: of its own, removed afterwards."""
         if self.stopped:
             raise Interrupted
         os.makedirs(folder, exist_ok=True)
         image, figures = os.path.join(folder, "d.exr"), os.path.join(folder, "d.json")
-        command = [self.file, "gradient", scene_file, "--wrt", parameter, "--method", method,
-                   *self.length(seconds), "--seed", str(seed), "--threads", str(self.threads),
-                   "-o", image, "--json", figures]
-        if step:
-            command += ["--step", f"{step:.9g}"]
+        command = [self.file, "gradient", task.scene_file, "--wrt", task.parameter, "--method",
+                   task.method, *self.length(seconds), "--seed", str(seed), "--threads",
+                   str(self.threads), "-o", image, "--json", figures]
+        if task.step:
+            command += ["--step", f"{task.step:.9g}"]
         try:
-            return self._run(command, os.path.dirname(scene_file), 20 + 10 * seconds, image,
+            return self._run(command, os.path.dirname(task.scene_file), 20 + 10 * seconds, image,
                              figures)
         finally:
             shutil.rmtree(folder, ignore_errors=True)

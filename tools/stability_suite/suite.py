@@ -15,7 +15,7 @@ from common import read_json, write_json
 
 from . import closed_form, statistics
 from .families import CLOSED_FORM, FAMILIES, STEP
-from .program import DIFFERENCES, DONE, Interrupted, Run
+from .program import DIFFERENCES, DONE, Interrupted, Run, Task
 from .statistics import Estimate
 from .verdicts import verdict
 
@@ -133,9 +133,8 @@ class References:
 
     def _run(self, scene, file, method, seed, folder, step):
         seconds = REFERENCE * self.settings["seconds"]
-        return self.program.gradient(file, scene.parameter, method, seconds,
-                                     self.settings["seed"] + seed, os.path.join(folder, "run"),
-                                     step)
+        return self.program.gradient(Task(file, scene.parameter, method, step), seconds,
+                                     self.settings["seed"] + seed, os.path.join(folder, "run"))
 
     def _check(self, scene, file, folder, estimate):
         """The bias of a reference that is not made of differences, against differences; None if
@@ -269,7 +268,7 @@ class PointRunner:
 
     def all(self, methods, batch, seconds):
         """{method: runs}, interleaved so that what else the machine does hits all alike. A method
-        that fails is not asked again."""
+        that fails is not run again."""
         runs = {m: [] for m in methods}
         for repeat in range(REPEATS):
             for method in methods:
@@ -279,7 +278,7 @@ class PointRunner:
 
     def _one(self, method, batch, repeat, seconds):
         seed = self.settings["seed"] + 1 + repeat + REPEATS * batch
-        return self.program.gradient(self.file, self.scene.parameter, method, seconds, seed,
+        return self.program.gradient(Task(self.file, self.scene.parameter, method), seconds, seed,
                                      os.path.join(self.folder, f"{method}-{repeat}"))
 
     def figures(self, method, runs, reference):

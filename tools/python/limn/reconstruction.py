@@ -120,7 +120,7 @@ def _offsets(model: Model, other: Model) -> Any:
 
 def _refitted(model: Model, views: list[View], seconds: float, steps: int | None, seed: int,
               threads: int) -> Model:  # fmt: skip
-    """What these views tell: their own hull and steps; light and gloss begin as the model's."""
+    """What these views show: their own hull and steps; light and gloss begin as the model's."""
     positions, faces = visual_hull(views, _cells(views))
     found = model.on(positions, faces).remeshed(len(model.faces) // 3)
     for share, stage in ((0.4, _STAGES[0]), (0.6, _STAGES[2])):
@@ -156,7 +156,7 @@ def _errors(model: Model, views: Sequence[View], seconds: float, steps: int | No
 
 
 def _write_errors(file: str, errors: dict[str, Any]) -> None:
-    told = {
+    summary = {
         "about": "standard errors per vertex of object.ply: position along the normal [scene "
         "units], colour [linear], roughness; from two refits, each without another quarter of the "
         "views",
@@ -164,7 +164,7 @@ def _write_errors(file: str, errors: dict[str, Any]) -> None:
            for k, v in errors.items()},
     }  # fmt: skip
     with open(file, "w", encoding="utf-8") as stream:
-        json.dump(told, stream)
+        json.dump(summary, stream)
 
 
 def _hold_out(views: list[View], count: int | None) -> tuple[list[View], list[View]]:
@@ -182,7 +182,7 @@ def _cells(views: Sequence[View]) -> int:
 
 
 def _most_faces(views: Sequence[View], minutes: float) -> int:
-    """As fine as the photographs, which take many views to tell, and as the time allows.
+    """As fine as the photographs, which take many views to resolve, and as the time allows.
 
     Half of the faces face away, and five are seen in each pixel. A step's time grows with faces;
     with 4000 a minute there is time for about a hundred steps.
@@ -191,20 +191,33 @@ def _most_faces(views: Sequence[View], minutes: float) -> int:
     return int(np.clip(10 * np.mean(areas), 800, min(20000, max(800, 4000 * minutes))))
 
 
-def _fitted(model: Model, used: list[View], most: int, minutes: float, cameras: bool,
-            steps: Sequence[int | None], seed: int, threads: int, history: list[Progress], tell: Any) -> tuple[Model, bool]:  # fmt: skip
+@dataclass
+class _Request:
+    """What `reconstruct` was called with, as its stages need it."""
+
+    minutes: float
+    refine_cameras: bool
+    steps: list[int | None]  # of each stage
+    seed: int
+    threads: int
+    tell: Callable[[Progress], object] | None
+
+
+def _fitted(model: Model, used: list[View], most: int, request: _Request,
+            history: list[Progress]) -> tuple[Model, bool]:  # fmt: skip
     """The model after all stages, and whether Ctrl-C ended them; may move the views' cameras."""
     moved: dict[str, Any] = {}
-    for (stage, share, faces, how), count in zip(_STAGES, steps):
+    for (stage, share, faces, how), count in zip(_STAGES, request.steps):
         model = model.remeshed(int(most * faces))
         if stage == "light":
             model.colours = first_colours(model, used)
             first_light(model)
-        fit = PhotoFit(model, used, seed, threads)
+        fit = PhotoFit(model, used, request.seed, request.threads)
         fit.history, fit.steps, fit.moved = history, len(history), moved
-        refine = cameras and how.get("shape", True)
+        refine = request.refine_cameras and how.get("shape", True)
         try:
-            fit.run(Plan(60 * minutes * share, count, cameras=refine, **how), stage, tell)
+            seconds = 60 * request.minutes * share
+            fit.run(Plan(seconds, count, cameras=refine, **how), stage, request.tell)
         except KeyboardInterrupt:
             return fit.model, True
         model = fit.model
@@ -240,7 +253,7 @@ def reconstruct(
     object's pixels, at most 4000 a minute). refine_cameras: poses are fitted, too.
     tell(progress): after each step. Ctrl-C ends the fit; what it has found is written.
 
-    The sky's mean is grey, and the 98th percentile of colours is 0.8: photographs cannot tell
+    The sky's mean is grey, and the 98th percentile of colours is 0.8: photographs do not distinguish
     bright light from a bright object. Raises limn.InputError that names the file; warns of
     photographs that are left out and of masks with holes.
     """
@@ -257,8 +270,8 @@ def reconstruct(
     count = [None] * len(_STAGES) if steps is None else list(steps)
     if len(count) != len(_STAGES):
         raise InputError(f"steps: {len(count)} numbers for {len(_STAGES)} stages")
-    model, stopped = _fitted(model, used, faces or _most_faces(used, minutes), minutes,
-                             refine_cameras, count, seed, threads, history, tell)  # fmt: skip
+    request = _Request(minutes, refine_cameras, count, seed, threads, tell)
+    model, stopped = _fitted(model, used, faces or _most_faces(used, minutes), request, history)
     write_model(out, model, views)
     errors: dict[str, Any] = {}
     if not stopped:

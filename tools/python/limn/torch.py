@@ -12,7 +12,7 @@ from __future__ import annotations
 import atexit
 import weakref
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -24,7 +24,7 @@ __all__ = ["pose", "render"]
 
 
 # PyTorch never frees the graphs that are alive when Python ends. Scenes are taken out of them
-# before, or nanobind would tell of a leak.
+# before, or nanobind would report a leak.
 class _Held:
     def __init__(self, scene: Scene) -> None:
         self.scene: Scene | None = scene
@@ -40,40 +40,45 @@ def _let_go() -> None:
         held.scene = None
 
 
+class _Run(NamedTuple):
+    """What `render` was called with, but for the tensors."""
+
+    names: list[str]
+    spp: int | None
+    spp_grad: int | None
+    seed: int
+    threads: int
+
+
 class _Render(torch.autograd.Function):
     @staticmethod
-    def forward(
-        ctx: Any,
-        scene: Scene,
-        names: list[str],
-        spp: int | None,
-        spp_grad: int | None,
-        seed: int,
-        threads: int,
-        *tensors: Any,
-    ) -> Any:
+    def forward(ctx: Any, scene: Scene, run: _Run, *tensors: Any) -> Any:
         # Through float64: numpy does not know bfloat16.
-        numbers = {n: t.detach().to("cpu", torch.float64).numpy() for n, t in zip(names, tensors)}
+        numbers = {
+            n: t.detach().to("cpu", torch.float64).numpy() for n, t in zip(run.names, tensors)
+        }
         motions = Motions(scene, numbers)
         scene = motions.moved(scene)
-        ctx.run = _Held(scene), motions, names, spp_grad, 2 * seed + 1, threads
+        ctx.run = _Held(scene), motions, run
         ctx.save_for_backward(*tensors)
-        return torch.from_numpy(_render(scene, spp, 2 * seed, threads=threads).value)
+        return torch.from_numpy(_render(scene, run.spp, 2 * run.seed, threads=run.threads).value)
 
     @staticmethod
     @torch.autograd.function.once_differentiable
     def backward(ctx: Any, adjoint: Any) -> tuple[Any, ...]:
-        held, motions, names, spp, seed, threads = ctx.run
-        scene = held.scene
-        wanted = [n for n, need in zip(names, ctx.needs_input_grad[6:]) if need]
+        held, motions, run = ctx.run
+        wanted = [n for n, need in zip(run.names, ctx.needs_input_grad[2:]) if need]
         found = {}
         if wanted:
-            found = motions.backward(scene, adjoint.cpu().numpy(), wanted, spp, seed, threads)
+            found = motions.backward(
+                held.scene, adjoint.cpu().numpy(), wanted, run.spp_grad, 2 * run.seed + 1,
+                run.threads,
+            )  # fmt: skip
         gradients = [
             _gradient(found[n], t) if n in found else None
-            for n, t in zip(names, ctx.saved_tensors)
+            for n, t in zip(run.names, ctx.saved_tensors)
         ]
-        return (None,) * 6 + tuple(gradients)
+        return None, None, *gradients
 
 
 def _gradient(value: Any, tensor: Any) -> Any:
@@ -113,9 +118,8 @@ def render(
     render twice with seeds of their own and take ((a - target) * (b - target)).mean().
     """
     _check(scene, values)
-    names = list(values)
-    spp_grad = spp if spp_grad is None else spp_grad
-    return _Render.apply(scene, names, spp, spp_grad, seed, threads, *values.values())
+    run = _Run(list(values), spp, spp if spp_grad is None else spp_grad, seed, threads)
+    return _Render.apply(scene, run, *values.values())
 
 
 def pose(
