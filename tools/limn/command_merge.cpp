@@ -42,14 +42,14 @@ class MergeCommand final : public Command {
       if (command->name() != request.command || !command->join(reader)) continue;
       CLI::App app;
       command->add_options(app);
-      std::vector<std::string> words = request.words;
-      words.insert(words.end(), {"-o", output_});
-      if (!json_.empty()) words.insert(words.end(), {"--json", json_});
-      if (!threads_.empty()) words.insert(words.end(), {"--threads", threads_});
-      if (quiet_) words.emplace_back("--quiet");
-      std::reverse(words.begin(), words.end());  // as CLI11 takes them
+      std::vector<std::string> all = request.words;
+      all.insert(all.end(), {"-o", output_});
+      if (!json_.empty()) all.insert(all.end(), {"--json", json_});
+      if (!threads_.empty()) all.insert(all.end(), {"--threads", threads_});
+      if (quiet_) all.emplace_back("--quiet");
+      std::reverse(all.begin(), all.end());  // as CLI11 takes them
       try {
-        app.parse(words);
+        app.parse(all);
       } catch (const CLI::ParseError& error) {
         throw InputError({parts_.front()}, error.what());
       }
