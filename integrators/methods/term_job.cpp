@@ -19,6 +19,7 @@
 #include "integrators/pilot/allocation.h"
 #include "integrators/pilot/field_fit.h"
 #include "integrators/pilot/film_fit.h"
+#include "integrators/pilot/film_flow.h"
 #include "integrators/pilot/pilot.h"
 #include "integrators/pilot/probed.h"
 #include "integrators/pilot/random_motion.h"
@@ -388,7 +389,7 @@ class TermJob {
     const bool looks =
         film && probed.pilot.spp > 0 &&
         (!budget.timed() || is_time_for_film({probed.pilot.spp, watch.seconds(), settings.seconds},
-                                             estimator.motion_rates().moves_camera(), detail));
+                                             slides(estimator), detail));
     if (looks) {
       look_at_film(p, turns, budget, size, probing, probed);
       if (!budget.timed() || watch.seconds() < kPilotShare * settings.seconds)
@@ -399,7 +400,13 @@ class TermJob {
     result.pilot_spp = probed.pilot.spp;
     plan.film = std::move(probing.film);
     share_out(estimator, probed, most_work_of(budget, probed.pilot), plan);
+    if (!plan.film.empty()) refine(plan, probing.grid);
     return plan;
+  }
+
+  // Whether what is seen within surfaces may slide.
+  static bool slides(const TermEstimator& estimator) {
+    return estimator.motion_rates().moves_camera() || moves_textures(estimator.scene());
   }
 
   // In timed runs, of a share of the pixels where samples of all take too long.
@@ -409,8 +416,7 @@ class TermJob {
     if (!budget.timed()) return {pixels, spp};
     const double each = seconds_of_pixel(estimator, turns, budget.settings, budget.watch);
     // Two more pilots may follow.
-    const bool several =
-        detail > 0 && (estimator.motion_rates().moves_camera() || detail >= kFilmDetail);
+    const bool several = detail > 0 && (slides(estimator) || detail >= kFilmDetail);
     const double share = several ? kPilotShare / 3 : kPilotShare;
     return pilot_size(each, pixels, spp, share * budget.settings.seconds,
                       budget.settings.seconds - budget.watch.seconds());

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "integrators/pilot/allocation.h"
+#include "integrators/pilot/film_flow.h"
 #include "integrators/pilot/pilot.h"
 #include "limn/core/parallel.h"
 
@@ -135,6 +136,7 @@ struct Coefficients {
 struct CellFit {
   std::array<Coefficients, kFolds> folds;
   Coefficients all;
+  int flow = -1;  // of FilmFlows, of which it is the motion there; none: a fit
 };
 using Fits = std::vector<std::vector<CellFit>>;  // [parameter][cell]
 
@@ -153,13 +155,15 @@ void add_to(Matrix& sum, double weight, const Matrix& m) {
 // Finds the motion that leaves least squared error times work.
 class FilmFitter {
  public:
-  // samples: of each cell and fold. work: of a sample of each slot.
+  // samples: of each cell and fold. flows: where each cell is looked at. work: of a sample of each
+  // slot.
   FilmFitter(const PlanGrid& grid, const Entries& entries, const std::vector<SlotSums>& slots,
-             int samples, std::vector<double> work, int threads)
+             int samples, const FilmFlows& flows, std::vector<double> work, int threads)
       : grid_(grid),
         entries_(entries),
         slots_(slots),
         samples_(samples),
+        flows_(flows),
         work_(std::move(work)),
         threads_(threads) {}
 
@@ -177,7 +181,7 @@ class FilmFitter {
   }
   // What is left of squared error times work, cross-validated; 1 where nothing moves.
   double left() const { return left_; }
-  const Coefficients& of(int parameter, size_t cell) const { return fits_[parameter][cell].all; }
+  const CellFit& of(int parameter, size_t cell) const { return fits_[parameter][cell]; }
 
  private:
   // After equal time, where samples are shared out best.
@@ -263,6 +267,18 @@ class FilmFitter {
       least.push_back(judged(k, Fits::value_type(grid_.size())));
       for (double& v : least[k]) v *= kConvincing;
     }
+    for (int flow = 0; flow < static_cast<int>(flows_.size()); ++flow) {
+      for (int k = 0; k < entries_.parameters(); ++k) {
+        Fits::value_type fits(grid_.size());
+        for (size_t cell = 0; cell < grid_.size(); ++cell) {
+          const FilmMotion& motion = flows_[flow][cell];
+          fits[cell].all = {motion.x[k], motion.y[k]};
+          fits[cell].folds.fill(fits[cell].all);
+          fits[cell].flow = flow;
+        }
+        take_better(k, fits, least[k]);
+      }
+    }
     for (const int radius : kRadii) {
       const CellMatrices all = windows(all_, radius);
       std::array<CellMatrices, kFolds> folds;
@@ -274,13 +290,18 @@ class FilmFitter {
             fits[cell].folds[fold] = solve(folds[fold][cell], k);
           fits[cell].all = solve(all[cell], k);
         });
-        const std::vector<double> left = judged(k, fits);
-        for (size_t cell = 0; cell < grid_.size(); ++cell) {
-          if (!(left[cell] < least[k][cell])) continue;
-          least[k][cell] = left[cell];
-          fits_[k][cell] = fits[cell];
-        }
+        take_better(k, fits, least[k]);
       }
+    }
+  }
+
+  // Where fits leave less than the least so far.
+  void take_better(int parameter, const Fits::value_type& fits, std::vector<double>& least) {
+    const std::vector<double> left = judged(parameter, fits);
+    for (size_t cell = 0; cell < grid_.size(); ++cell) {
+      if (!(left[cell] < least[cell])) continue;
+      least[cell] = left[cell];
+      fits_[parameter][cell] = fits[cell];
     }
   }
 
@@ -311,6 +332,7 @@ class FilmFitter {
   Entries entries_;
   const std::vector<SlotSums>& slots_;
   int samples_;
+  const FilmFlows& flows_;  // in units of the probing motion
   std::vector<double> work_;
   int threads_;
   // Of all slots, weighed: from all samples, from those of all folds but one, and about these.
@@ -325,8 +347,8 @@ class FilmFitter {
 // pixel.
 class FilmPilot {
  public:
-  FilmPilot(const TermEstimator& estimator, const PlanGrid& grid)
-      : estimator_(estimator), grid_(grid), entries_(estimator.lanes()) {
+  FilmPilot(const TermEstimator& estimator, const PlanGrid& grid, FilmFlows flows)
+      : estimator_(estimator), grid_(grid), flows_(std::move(flows)), entries_(estimator.lanes()) {
     auto probe = std::make_unique<FilmProbe>(estimator, grid, kTurn);
     probe_ = probe.get();
     probes_.push_back(std::move(probe));
@@ -368,7 +390,7 @@ class FilmPilot {
                      (static_cast<double>(samples_) * static_cast<double>(pixels)));
     }
     const int of_fold = std::max(1, samples_ / (2 * kFolds));
-    FilmFitter fitter(grid_, entries_, sums_, of_fold, std::move(work), threads);
+    FilmFitter fitter(grid_, entries_, sums_, of_fold, flows_, std::move(work), threads);
     fitter.run();
     return fitter;
   }
@@ -394,6 +416,7 @@ class FilmPilot {
 
   const TermEstimator& estimator_;
   const PlanGrid& grid_;
+  FilmFlows flows_;
   Entries entries_;
   std::vector<std::unique_ptr<SampleEstimator>> probes_;  // one
   const FilmProbe* probe_;
@@ -407,6 +430,23 @@ int whole_turns(double samples) {
   const int each = 2 * kTurn;
   return samples < each ? (samples < kTurn ? 0 : kTurn)
                         : static_cast<int>(std::min(samples, 1e6)) / each * each;
+}
+
+// The flows where each cell of a grid is looked at, in units of the probing motion.
+FilmFlows flows_of_probes(const FilmFlows& flows, const PlanGrid& of, const Film& film,
+                          const PlanGrid& grid, double unit) {
+  FilmFlows probes;
+  for (size_t flow = 0; flow < flows.size(); ++flow) {
+    probes[flow].resize(grid.size());
+    for (int y = film.crop_y; y < film.crop_y + film.crop_height; ++y) {
+      for (int x = film.crop_x; x < film.crop_x + film.crop_width; ++x) {
+        if (!grid.is_probe(film, x, y)) continue;
+        const FilmMotion& motion = flows[flow][of.index(x, y)];
+        probes[flow][grid.index(x, y)] = {motion.x * (1 / unit), motion.y * (1 / unit)};
+      }
+    }
+  }
+  return probes;
 }
 
 bool looks_after(int samples, int last) {
@@ -470,27 +510,30 @@ double edges_per_pixel(const TermEstimator& estimator) {
 // 1.0 to 1.3 (mirrors, concave, soft shadow, demo), 1.4 to 1.7 (object in view, plant, CAD part).
 // Where several edges lie in a pixel, it may be a factor of ten and more, and a pilot of a share of
 // the pixels finds it.
-bool is_time_for_film(const PilotTime& pilot, bool moves_camera, double detail) {
+bool is_time_for_film(const PilotTime& pilot, bool slides, double detail) {
   constexpr double kShare = 1.0 / 28, kCameraShare = 1.0 / 6;  // of the time
   return 4 * pilot.taken < kShare * pilot.seconds * pilot.spp ||
-         ((moves_camera || detail >= kFilmDetail) && pilot.taken < kCameraShare * pilot.seconds);
+         ((slides || detail >= kFilmDetail) && pilot.taken < kCameraShare * pilot.seconds);
 }
 
 FilmFit fit_film(TermEstimator& estimator, const SamplePlan& plan, const FilmLook& look,
                  const RunSettings& settings, const Stopwatch& watch) {
+  const Film& film = estimator.scene().film;
   FilmFit fit;
-  fit.grid = PlanGrid(estimator.scene().film, look.pixels);
+  fit.grid = PlanGrid(film, kMostProbes);
+  const PlanGrid probes(film, look.pixels);
   const int parameters = estimator.lanes();
   const double unit = film_speed(estimator);
   if (!(unit > 0) || !std::isfinite(unit)) return fit;
   FilmMotion probing;  // in the free lanes behind the parameters'
   probing.x[parameters] = probing.y[parameters + 1] = unit;
   SamplePlan moving = plan;
-  moving.grid = fit.grid;
-  moving.film.assign(fit.grid.size(), probing);
+  moving.grid = probes;
+  moving.film.assign(probes.size(), probing);
   estimator.set_plan(std::move(moving));
 
-  FilmPilot pilot(estimator, fit.grid);
+  const FilmFlows flows = film_flows(estimator, fit.grid, settings.threads);
+  FilmPilot pilot(estimator, probes, flows_of_probes(flows, fit.grid, film, probes, unit));
   const double began = watch.seconds();
   for (int last = kTurn; pilot.samples() < last;) {
     if (!pilot.run_sample(settings, watch)) return fit;
@@ -507,9 +550,12 @@ FilmFit fit_film(TermEstimator& estimator, const SamplePlan& plan, const FilmLoo
     if (pilot.samples() < last) continue;
     fit.motion.resize(fit.grid.size());
     for (size_t cell = 0; cell < fit.grid.size(); ++cell) {
+      const size_t probe = in_grid(probes, fit.grid, cell);
       for (int k = 0; k < parameters; ++k) {
-        fit.motion[cell].x[k] = fitter.of(k, cell).x * unit;
-        fit.motion[cell].y[k] = fitter.of(k, cell).y * unit;
+        const CellFit& chosen = fitter.of(k, probe);
+        const FilmMotion* flow = chosen.flow < 0 ? nullptr : &flows[chosen.flow][cell];
+        fit.motion[cell].x[k] = flow ? flow->x[k] : chosen.all.x * unit;
+        fit.motion[cell].y[k] = flow ? flow->y[k] : chosen.all.y * unit;
       }
     }
   }

@@ -17,7 +17,7 @@ namespace limn {
 inline constexpr int kMostFilmParameters = kLanes - 2;
 
 struct FilmFit {
-  PlanGrid grid;                   // that of run_pilot
+  PlanGrid grid;                   // as fine as kMostProbes allows
   std::vector<FilmMotion> motion;  // by cell; empty if positions are better held everywhere
 };
 
@@ -42,12 +42,14 @@ inline constexpr double kFilmDetail = 2;
 // Edges that move on the film, hidden ones too, for each pixel that any of them lies in.
 double edges_per_pixel(const TermEstimator& estimator);
 
-// Whether looking for motion pays: it takes two pilots more. detail: edges_per_pixel.
-bool is_time_for_film(const PilotTime& pilot, bool moves_camera, double detail);
+// Whether looking for motion pays: it takes two pilots more. slides: whether textures, or all
+// that is seen, may slide. detail: edges_per_pixel.
+bool is_time_for_film(const PilotTime& pilot, bool slides, double detail);
 
-// By a pilot. The estimator has kMostFilmParameters at most, and is left with a plan that is of no
-// use. settings, watch: as of run_pilot; it takes a 16th of a limit of time. Deterministic on
-// any number of threads.
+// By a pilot, which chooses between film_flows and motions that fit its samples, in windows about
+// each cell that it looks at. The estimator has kMostFilmParameters at most, and is left with a
+// plan that is of no use. settings, watch: as of run_pilot; it takes a 16th of a limit of time.
+// Deterministic on any number of threads.
 FilmFit fit_film(TermEstimator& estimator, const SamplePlan& plan, const FilmLook& look,
                  const RunSettings& settings, const Stopwatch& watch);
 

@@ -4,6 +4,7 @@
 
 #include "integrators/estimates/batches.h"
 #include "integrators/pilot/film_fit.h"
+#include "integrators/pilot/film_flow.h"
 #include "integrators/pilot/pilot.h"
 #include "integrators/pilot/term_estimator.h"
 #include "limn/edgetree/edge_sampler_types.h"
@@ -316,6 +317,89 @@ TEST(FilmMotion, IsHeldWhereItDoesNotPay) {
       run_method(scene, {"plate.translate.x"}, "adaptive:film=fixed:generator=independent", 64, 3);
   EXPECT_EQ(share_that_moves(chosen), 0);
   expect_same_bits(chosen, held);
+}
+
+// A card that half the light passes, beside a floor, and the sky behind them.
+Scene card_scene(const TempFiles& files, int size) {
+  SceneParts parts;
+  parts.width = parts.height = size;
+  parts.origin = {0, 0, 6};
+  parts.target = {0, 0, 0};
+  const std::string checks = R"(<bsdf type="diffuse"><texture type="checkerboard"
+      name="reflectance"><float name="color0" value="0.1"/><float name="color1" value="0.9"/>
+      <transform name="to_uv"><scale x="40" y="40"/></transform></texture></bsdf>)";
+  parts.body = square("card", 1, 0, {0.6, 0, 0}, R"(<bsdf type="mask">)" + checks + "</bsdf>") +
+               square("board", 3, 0, {0, 0, -2}, checks) + constant_light("sky", "0.2, 0.3, 0.4");
+  return make_scene(files, parts);
+}
+
+std::unique_ptr<TermEstimator> estimator_of(const Scene& scene, const std::string& name) {
+  const EdgeSamplerType& sampler = edge_sampler_type("silhouettes");
+  const auto terms = terms_of(scene, sampler, false, true);
+  const Parameter parameter = find_parameter(scene, name);
+  return std::make_unique<TermEstimator>(scene, std::span(&parameter, 1), terms,
+                                         std::vector<bool>(terms.size(), true), sampler, 1,
+                                         TermExtras{.moved_film = true});
+}
+
+// Surfaces that face the camera move alike everywhere on the film; the mean is that of what is seen
+// behind a card that is half transparent, too.
+TEST(FilmFlow, IsTheMotionOfWhatIsSeen) {
+  const TempFiles files;
+  const Scene scene = card_scene(files, 8);
+  const PlanGrid grid(scene.film, film_size(scene.film));
+  const double pixels = 8 / (2 * std::tan(20 * kPi / 180));  // at distance 1
+  const auto expect = [&](const std::string& parameter, double card, double board) {
+    const FilmFlows flows = film_flows(*estimator_of(scene, parameter), grid, 2);
+    const auto at = [&](double x) {  // of the axis at this place of the card
+      const auto p = scene.camera.project(Vec3d{x, 0.05, 0});
+      return grid.index(static_cast<int>(p.x), static_cast<int>(p.y));
+    };
+    EXPECT_NEAR(std::fabs(flows[0][at(0.6)].x[0]), 0.5 * (card + board), 1e-5) << parameter;
+    EXPECT_NEAR(std::fabs(flows[1][at(0.6)].x[0]), card, 1e-5) << parameter;
+    for (const auto& flow : flows) {
+      EXPECT_NEAR(std::fabs(flow[at(-1.5)].x[0]), board, 1e-5) << parameter;
+      EXPECT_NEAR(flow[at(0.6)].y[0], 0, 1e-6) << parameter;
+    }
+  };
+  expect("card.translate.x", pixels / 6, 0);
+  expect("board.translate.x", 0, pixels / 8);
+  expect("sensor.translate.x", pixels / 6, pixels / 8);
+}
+
+TEST(FilmFlow, TellsWhereTexturesMove) {
+  const TempFiles files;
+  const Scene scene = card_scene(files, 8);
+  EXPECT_TRUE(moves_textures(estimator_of(scene, "board.translate.x")->scene()));
+  EXPECT_FALSE(moves_textures(estimator_of(scene, "sensor.translate.x")->scene()));
+  const Scene plain = scene_with(files, kFilters[0], 8);
+  EXPECT_FALSE(moves_textures(estimator_of(plain, "ball.translate.x")->scene()));
+}
+
+// Texture finer than a pixel slides: samples of few pixels find which motion follows it, and each
+// pixel has its own.
+TEST(FilmFlow, IsChosenWhereItFits) {
+  const TempFiles files;
+  const Scene scene = card_scene(files, 24);
+  const auto estimator = estimator_of(scene, "board.translate.x");
+  const Stopwatch watch;
+  RunSettings settings;
+  settings.spp = 64;
+  SamplePlan plan;
+  const FilmFit fit = fit_film(*estimator, plan, {8, 1e9, 1, 144}, settings, watch);
+  ASSERT_FALSE(fit.motion.empty());
+  EXPECT_EQ(fit.grid.size(), film_size(scene.film) / 3);
+  const FilmFlows flows = film_flows(*estimator, fit.grid, 1);
+  int follows = 0;
+  for (size_t cell = 0; cell < fit.grid.size(); ++cell) {
+    for (const auto& flow : flows) {
+      if (flow[cell].x[0] != 0 && fit.motion[cell].x[0] == flow[cell].x[0]) {
+        ++follows;
+        break;
+      }
+    }
+  }
+  EXPECT_GT(follows, static_cast<int>(fit.grid.size()) / 2);
 }
 
 // Edges at rest are listed while positions move, and then forgotten.
