@@ -131,6 +131,7 @@ Fit::Impl::Impl(std::vector<FitView> all, const FitOptions& options, const RunSe
   check_channels();
   check_terms();
   if (is_exact()) check_exact();
+  check_blur();
   if (!options.remesh.empty()) check_remeshing();
   // As it is before the first step; views differ in little but the camera.
   if (!over_faces()) {
@@ -292,6 +293,7 @@ bool Fit::Impl::add_view(size_t view, FitRecord& record,
       settings_.progress(share * (static_cast<double>(view) + (1 + 2 * done) / 3));
     };
   }
+  if (blur().sigma > 0) return add_blurred(view, loss.adjoint, own, gradients);
   const BackwardResult result = backward(v.scene, loss.adjoint, backward_options, own);
   if (result.non_finite.count > 0) throw InputError("gradient: " + result.non_finite.message());
   if (result.spp < own.spp) return false;
@@ -327,6 +329,7 @@ std::optional<FitRecord> Fit::Impl::step() {
   const Stopwatch watch;
   FitRecord record;
   record.step = steps;
+  record.sigma = blur().sigma;
   record.step_size = options_.step;
   if (options_.step_half_life > 0) {
     record.step_size *= std::exp2(-static_cast<double>(steps) / options_.step_half_life);

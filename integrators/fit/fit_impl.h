@@ -64,6 +64,12 @@ class Fit::Impl {
   bool over_faces() const { return options_.backward.points == FilmPoints::kFaces; }
   // Per pixel, of this step, if there were so many at the first one.
   int samples_of(int first) const;
+  // In fit_blurred.cpp.
+  void check_blur() const;
+  Blur blur() const;  // of this step; sigma 0: the gradient is that of sharp faces
+  // Adds the gradient of the blurred scene. False: interrupted.
+  bool add_blurred(size_t view, const Image& adjoint, const RunSettings& settings,
+                   std::vector<std::vector<double>>& gradients) const;
   // False: interrupted.
   bool add_view(size_t view, FitRecord& record, std::vector<std::vector<double>>& gradients);
   // Loss and gradients of all views; false: interrupted.

@@ -10,6 +10,7 @@
     scenes/fits/fits.py tree      how far a tree is turned, from its shadow
     scenes/fits/fits.py gears     how far each of fifteen gears is turned, from their shadows
     scenes/fits/fits.py displacement  162 vertices along their normals, from eight sides
+    scenes/fits/fits.py regularised  from bad starts, see ../regularised
     scenes/fits/fits.py curves    of these three: scenes/pictures/fit_curves.webp
     scenes/fits/fits.py picture   of the shapes that these found: scenes/pictures/fits.webp
 
@@ -380,6 +381,85 @@ def reached(fit, part):
     return found
 
 
+@dataclass
+class Start:
+    """A start from which an object, a light or the camera is to find back: see regularised()."""
+
+    scene: str
+    parameters: list
+    sigma: float
+    start: list  # defines
+    truth: list = field(default_factory=list)
+    goal: list = field(default_factory=list)  # what the truth's values are; else the loss tells
+    far: float = 0  # how far the start is from it
+    steps: int = 60
+    options: str = "--spp 4 --step 4 --step-half-life 20"
+
+
+def moves(name, axes):
+    return [f"{name}.translate.{axis}" for axis in axes]
+
+
+VIEW_OF_FLOOR = ["y=1.9", "look=0"]
+REGULARISED = {
+    "albedos": Start("room", [f"{c}.reflectance" for c in ("white", "red", "green", "grey")], 0.01,
+                     [f"{c}=0.4, 0.4, 0.4" for c in ("white", "red", "green", "grey")]),
+    "camera": Start("room", moves("sensor", "x"), 0.01, ["view_x=0.5"], [], [0], 0.5),
+    "light": Start("room", moves("lamp", "xz"), 0.04, ["lamp_x=0.8", "lamp_z=0.6"], [],
+                   [-0.8, -0.6], 1),
+    "rotation": Start("room", [f"box.rotate.{a}" for a in "xyz"], 0.01,
+                      ["pitch=20", "yaw=30", "roll=-20"]),
+    "focus": Start("room", ["sensor.focus_distance"], 0.01, ["aperture=0.15", "focus=2.5"],
+                   ["aperture=0.15"], [3.5], 1),
+    "shadow": Start("room", moves("box", "xz"), 0.15, [*VIEW_OF_FLOOR, "x=0.4", "z=-0.3"],
+                    VIEW_OF_FLOOR, [-0.4, 0.3], 0.5),
+    "far shadow": Start("room", moves("box", "xz"), 0.15, [*VIEW_OF_FLOOR, "x=0.75", "z=-0.3"],
+                        VIEW_OF_FLOOR, [-0.75, 0.3], 0.808, 90),
+    "torus": Start("torus", moves("torus", "xy"), 0.16, ["x=1.5", "y=0.2"], [], [-1.5, -0.2],
+                   1.513),
+    "wide torus": Start("torus", moves("torus", "xy"), 0.16, ["x=1.8", "y=0.2", "fov=70"],
+                         ["fov=70"], [-1.8, -0.2], 1.811),
+    "mirrors": Start("../fits/two_mirrors", moves("object", "xyz"), 0.16,
+                     ["width=48", "height=24", "x=0.2", "y=1.3", "z=0.2"],
+                     ["width=48", "height=24"], [-0.2, -1.3, -0.2], 1.330, 90),
+}
+
+
+def regularised(fits, _):
+    """After Quinn 2021, Sec. 5.2 and 5.4: exact gradients, a pyramid, and blurred first steps."""
+    from paper_figures.meshes import torus, write_obj
+
+    points, faces = torus(168)
+    write_obj(fits.path("torus.obj"), 0.5 * points, faces)
+    mesh = [f"mesh={os.path.abspath(fits.path('torus.obj'))}", "format=obj"]
+    rows = []
+    for name in fits.chosen(REGULARISED):
+        s, found = REGULARISED[name], []
+        start, truth = ([*d, *(mesh if s.scene != "room" else [])] for d in (s.start, s.truth))
+        base = f"../regularised/{s.scene}"
+        target = fits.render(base, f"regularised_{name.replace(' ', '_')}.exr", truth)
+        blur = f"--sigma {s.sigma} --blur-steps {s.steps * 2 // 3}"
+        for variant, more in (("exact", ""), ("pyramid", "--pyramid 5"), ("blurred", blur)):
+            ends = []
+            for seed in (1, 2, 3):
+                fit = fits.fit(folder_of(name, f"{variant} {seed}"), base, [target], s.steps,
+                               " ".join(repeated("--wrt", s.parameters)) +
+                               f" {s.options} --seed {seed} {more}", start)
+                ends.append(_end(fit, s))
+            found.append(" ".join(ends))
+        rows.append([name, *found])
+    return ["fit", "exact", "pyramid", "blurred"], rows
+
+
+def _end(fit, start):
+    """How far the end is from the truth, over how far the start was; else of losses their root."""
+    if start.goal:
+        left = [v["value"] - goal for v, goal in zip(fit["scalars"], start.goal)]
+        return f"{math.hypot(*left) / start.far:.3f}"
+    last = [h["loss"] for h in fit["history"][-5:]]
+    return f"{math.sqrt(max(0, sum(last)) / len(last) / fit['history'][0]['loss']):.3f}"
+
+
 def panels_of(rows, columns, height, **shared):
     import matplotlib
 
@@ -447,8 +527,8 @@ def picture(fits, _):
 
 
 EXPERIMENTS = {**dict.fromkeys(SHAPES, fit_shape), "pose": pose, "drift": drift,
-               **dict.fromkeys(FUNCTIONS, fit_function), "curves": curves,
-               "picture": picture}
+               **dict.fromkeys(FUNCTIONS, fit_function), "regularised": regularised,
+               "curves": curves, "picture": picture}
 
 
 def main():

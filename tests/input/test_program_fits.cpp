@@ -84,6 +84,28 @@ TEST_F(Program, FitsAndGoesOn) {
   EXPECT_FALSE(std::ifstream(files_.path("other") + "/state.cbor"));
 }
 
+// A break in the blurred steps changes no bits; the folder tells their sigma.
+TEST_F(Program, FitsThatBeginBlurredGoOn) {
+  const std::string target = files_.path("target.exr");
+  ASSERT_EQ(run("render " + scene_ + " -D glow=3 --spp 4 -o " + target).status, 0);
+  const std::string whole = files_.path("whole"), broken = files_.path("broken");
+  const std::string fit = "fit " + scene_ + " --target " + target +
+                          " --wrt screen.translate.x --wrt blaze.radiance --spp 2 --no-report "
+                          "--sigma 0.04 --sigma-end 0.01 --blur-steps 3 --steps ";
+  const Outcome outcome = run(fit + "4 --snapshots 1 -o " + whole);
+  ASSERT_EQ(outcome.status, 0) << outcome.text;
+  EXPECT_NE(outcome.text.find("std. error       sigma  "), std::string::npos) << outcome.text;
+  ASSERT_EQ(run(fit + "1 -o " + broken).status, 0);
+  ASSERT_EQ(run("fit --steps 4 --no-report --resume " + broken).status, 0);
+  EXPECT_EQ(bytes_of(whole + "/state.cbor"), bytes_of(broken + "/state.cbor"));
+  const json history = json::parse(bytes_of(whole + "/fit.json"))["history"];
+  const double sigmas[] = {0.04, 0.02, 0.01, 0};
+  for (int i = 0; i < 4; ++i) EXPECT_DOUBLE_EQ(history[i]["sigma"], sigmas[i]);
+  EXPECT_NE(bytes_of(whole + "/history.csv").find(",halvings,sigma,seconds"), std::string::npos);
+  EXPECT_NE(refused(fit + "4 --wrt lamp.vertex_positions -o " + out()).find("is an array"),
+            std::string::npos);
+}
+
 // Pairs of steps and changes are in the folder, too; at rest there is nothing to go on with.
 TEST_F(Program, FitsByLbfgsGoOn) {
   std::string text = bytes_of(scene_);

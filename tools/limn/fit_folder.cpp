@@ -50,7 +50,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-constexpr int kFormat = 5;                  // of fit.json and state.cbor
+constexpr int kFormat = 6;                  // of fit.json and state.cbor
 constexpr size_t kDistanceSamples = 10000;  // on each surface; not tuned
 
 // Calls visit(name, member) for what is no row of the table of options: reading and writing go over
@@ -182,16 +182,16 @@ std::vector<const Shape*> fitted_shapes(const Fit& fit,
 
 // A line per step.
 std::string csv_text(const json& history, const std::vector<FitScalar>& scalars) {
-  std::string csv = "step,loss,stderr,step_size,halvings,seconds";
+  std::string csv = "step,loss,stderr,step_size,halvings,sigma,seconds";
   for (const FitScalar& s : scalars) csv += "," + s.name;
   csv += "\n";
   for (const json& r : history) {
     const json& error = r.at("stderr");
-    csv += fmt::format("{},{:.9g},{},{:.9g},{},{:.3f}", r.at("step").get<int64_t>(),
+    csv += fmt::format("{},{:.9g},{},{:.9g},{},{:.9g},{:.3f}", r.at("step").get<int64_t>(),
                        r.at("loss").get<double>(),
                        error.is_null() ? "" : fmt::format("{:.3g}", error.get<double>()),
                        r.at("step_size").get<double>(), r.at("halvings").get<int>(),
-                       r.at("seconds").get<double>());
+                       r.at("sigma").get<double>(), r.at("seconds").get<double>());
     for (const FitScalar& s : scalars) {
       csv += fmt::format(",{:.9g}", r.at("values").at(s.name).get<double>());
     }
@@ -325,6 +325,7 @@ void FitFolder::add(const FitRecord& r, const Fit& fit) {
                       {"views", r.view_losses},
                       {"step_size", r.step_size},
                       {"halvings", r.halvings},
+                      {"sigma", r.sigma},
                       {"evaluations", r.evaluations},
                       {"at_rest", r.at_rest},
                       {"values", scalars},
@@ -362,6 +363,8 @@ void FitFolder::print_snapshot(const Fit& fit, const json& meshes) {
   add("step", 6, std::to_string(fit.steps()));
   add("loss", 10, figure(last, "loss", FMT_STRING("{:.4g}")));
   add("std. error", 10, figure(last, "stderr", FMT_STRING("{:.1g}")));
+  if (arguments_.options.blur_steps > 0)
+    add("sigma", 10, figure(last, "sigma", FMT_STRING("{:.3g}")));
   for (const FitScalar& s : fit.scalars()) add(s.name, 12, fmt::format("{:.6g}", s.value));
   for (const json& mesh : meshes) {
     const std::string shape = mesh.at("shape").get<std::string>();

@@ -161,6 +161,7 @@ void bind_record(nb::module_& m) {
       .def_ro("stderr", &FitRecord::error, "Of the loss; NaN with one sample per pixel.")
       .def_ro("view_losses", &FitRecord::view_losses)
       .def_ro("step_size", &FitRecord::step_size, "In natural steps.")
+      .def_ro("sigma", &FitRecord::sigma, "Of the blurred faces of its gradient; 0: it was exact.")
       .def_ro("halvings", &FitRecord::halvings,
               "How often the step was halved, so that no face lost its area.")
       .def_ro("remeshed", &FitRecord::remeshed)

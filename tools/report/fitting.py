@@ -44,6 +44,7 @@ class FitSection(Section):
             self._strip(),
             element("h3", "Loss"),
             charts.loss_over_steps(self.palette, losses) if losses else "No step yet.",
+            self._blur(),
             self._values(),
             self._distances(),
             element("h3", "Snapshots"), self._table(),
@@ -69,6 +70,13 @@ class FitSection(Section):
         cards = [self.card(head, *(self.figure(name, f"view {v}, {head}", f"view {v}")
                                    for v, name in enumerate(names))) for head, names in columns]
         return self.gallery(cards, wide=True) if len(cards) > 1 else None
+
+    def _blur(self):
+        sigmas = [(h.number("step"), h.number("sigma")) for h in self.history if h.number("sigma")]
+        if not sigmas:
+            return None
+        return join(element("h3", "Blur: sigma"),
+                    charts.values_over_steps(self.palette, {"sigma": sigmas}))
 
     def _values(self):
         """Curves of scalars, and what they were at each snapshot."""

@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "limn/core/blur.h"
 #include "limn/core/image.h"
 #include "limn/core/scene.h"
 #include "limn/integrators/backward.h"
@@ -78,6 +79,14 @@ struct FitOptions {
   std::vector<int64_t> remesh;
   double remesh_edge = 0.75;
   double remesh_shrink = 0.65;
+  // The first blur_steps steps take derivatives of the scene with its faces blurred (core/blur.h,
+  // kOrdered, shaded flat) in place of exact ones: no gradient of the loss, but 0 in the mean where
+  // the image meets the target, and not 0 beside what is near and does not overlap yet. sigma goes
+  // from blur.sigma to sigma_end (0: a hundredth) evenly in its logarithm, gamma as its root. For
+  // scalars and colours; InputError for arrays, lbfgs and faces. 0: none, then with sigma 0.
+  int blur_steps = 0;
+  Blur blur;
+  double sigma_end = 0;
   int loss_spp = 0;  // samples per pixel of each of the two images of the loss; 0: settings.spp
   // Terms and where samples go; `parameters` is not looked at.
   BackwardOptions backward;
@@ -89,6 +98,7 @@ struct FitRecord {
   // Before the step; mean over views. May be negative, see LossResult.
   double loss = 0, error = 0;
   std::vector<double> view_losses;
+  double sigma = 0;      // of the gradient's blurred faces; 0: it was exact
   double step_size = 0;  // that was tried, in natural steps
   // How often it was halved so that no face lost its area or grew together with another; if 30
   // times, that shape was left where it was.

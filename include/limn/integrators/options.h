@@ -201,6 +201,26 @@ void visit_options(Like<FitOptions> auto& o, auto&& visit) {
   visit(o.remesh_shrink,
         Option{"remesh_shrink", "Factor on the lengths of steps and smoothing after each remeshing",
                0.01L, 1});
+  visit(
+      o.blur_steps,
+      Option{"blur_steps",
+             "Begin with so many steps on a scene whose faces are blurred, with gradients of what "
+             "does not overlap yet; `sigma` is then needed, and scalars and colours are fitted",
+             1, 1 << 30}
+          .or_zero("none"));
+  visit(o.blur.sigma, Option{"sigma",
+                             "In the first step, square of the width over which faces fade beyond "
+                             "their sides, in squared scene units",
+                             1e-30L, 1e30L}
+                          .or_zero("not blurred"));
+  visit(o.sigma_end,
+        Option{"sigma_end", "The same in the last of `blur_steps`", 1e-30L, 1e30L}.or_zero(
+            "a hundredth of `sigma`"));
+  visit(o.blur.gamma, Option{"gamma",
+                             "Depth over which blurred surfaces mix in the first step, in scene "
+                             "units; it shrinks as the root of sigma does",
+                             1e-15L, 1e15L}
+                          .or_zero("none"));
   visit(o.loss_spp, Option{"loss_spp",
                            "Samples per pixel of each of the two images from which the loss is "
                            "computed",

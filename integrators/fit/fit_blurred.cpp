@@ -1,0 +1,116 @@
+// The first steps of a fit, by derivatives of a scene whose faces are blurred. They are not 0 where
+// an object is only near its target, so that it moves towards what it does not overlap yet. The
+// adjoint is that of the sharp image: with that of a blurred one, which is brighter than the
+// target, objects leave the view (scenes/regularised). So a step is no gradient of a loss, but its
+// mean is 0 where the image meets the target, whatever sigma is.
+// The step is the product of derivative images and adjoint: numbers are few, arrays are refused.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <span>
+
+#include "integrators/estimates/batches.h"
+#include "integrators/fit/fit_impl.h"
+#include "integrators/methods/blurred_estimator.h"
+#include "limn/core/blur_tracer.h"
+#include "limn/core/error.h"
+#include "limn/core/exposure.h"
+
+namespace limn {
+namespace {
+
+// Blurred faces have no interpolated normals.
+Scene flat(const Scene& scene) {
+  Scene copy = deep_copy(scene);
+  for (Shape& shape : copy.shapes) {
+    shape.mesh.normal_source = NormalSource::kFace;
+    shape.mesh.normals.clear();
+    shape.mesh.normal_ids.clear();
+  }
+  return copy;
+}
+
+}  // namespace
+
+void Fit::Impl::check_blur() const {
+  const Blur& first = options_.blur;
+  if ((options_.blur_steps > 0) != (first.sigma > 0)) {
+    throw InputError(
+        "a fit that begins blurred needs both `sigma`, of the first step, and `blur_steps`");
+  }
+  if (options_.blur_steps == 0) {
+    if (first.gamma == 0 && options_.sigma_end == 0) return;
+    throw InputError("gamma and sigma_end are for fits that begin blurred: give sigma, too");
+  }
+  if (is_exact() || over_faces()) {
+    throw InputError("fits that begin blurred need random points and another optimiser than lbfgs");
+  }
+  for (const FitParameter& p : parameters_) {
+    if (!p.is_array() && !p.is_map()) continue;
+    throw InputError(fmt::format(
+        "\"{}\" is an array: a fit that begins blurred takes scalars and colours", p.name()));
+  }
+  for (size_t v = 0; v < views.size(); ++v) {
+    check_blurred(flat(views[v].scene));
+    std::vector<Parameter> own;
+    for (const FitParameter& p : parameters_) {
+      if (p.in_view(v)) own.push_back(*p.in_view(v));
+    }
+    check_still(views[v].scene, "a fit that begins blurred", own);
+  }
+}
+
+Blur Fit::Impl::blur() const {
+  if (steps >= options_.blur_steps) return {};
+  const Blur& first = options_.blur;
+  const double last = options_.sigma_end > 0 ? options_.sigma_end : first.sigma / 100;
+  const double part = static_cast<double>(steps) / std::max(1, options_.blur_steps - 1);
+  const double factor = std::pow(last / first.sigma, part);
+  return {first.sigma * factor, first.gamma * std::sqrt(factor)};
+}
+
+bool Fit::Impl::add_blurred(size_t view, const Image& adjoint, const RunSettings& settings,
+                            std::vector<std::vector<double>>& gradients) const {
+  std::vector<Parameter> list;
+  std::vector<size_t> of;  // their numbers among all parameters
+  for (size_t i = 0; i < parameters_.size(); ++i) {
+    if (!parameters_[i].in_view(view)) continue;
+    list.push_back(*parameters_[i].in_view(view));
+    of.push_back(i);
+    gradients[i].resize(list.back().numbers());
+  }
+  if (list.empty()) return true;
+  const Scene scene = flat(views[view].scene);
+  std::vector<std::unique_ptr<SampleEstimator>> passes;
+  for (size_t k = 0; k < list.size(); k += kLanes) {
+    const auto some = std::span(list).subspan(k).first(std::min<size_t>(kLanes, list.size() - k));
+    passes.push_back(std::make_unique<BlurredEstimator>(scene, resolved(blur(), scene), some,
+                                                        settings.threads, Numbers::kIndependent));
+  }
+  int64_t spp = 0;
+  NonFinite non_finite;
+  std::vector<std::array<double, 3>> sums(list.size());  // of the image's channels
+  run_batches(passes, settings, Stopwatch(), [&](const Batch& batch, const auto& done) {
+    for (size_t k = 0; k < list.size(); ++k) {
+      const std::vector<double>& image = done[k / kLanes].images[k % kLanes];
+      for (size_t j = 0; j < image.size(); ++j) {
+        sums[k][j % 3] += image[j] * static_cast<double>(adjoint.data[j]);
+      }
+    }
+    for (const BatchSums& pass : done) non_finite.merge(pass.non_finite);
+    spp += batch.count();
+  });
+  if (non_finite.count > 0) throw InputError("gradient: " + non_finite.message());
+  if (spp < settings.spp) return false;
+  // A channel of a colour is seen in that channel of the image alone.
+  for (size_t k = 0; k < list.size(); ++k) {
+    std::vector<double>& g = gradients[of[k]];
+    for (size_t c = 0; c < 3; ++c) g[c % g.size()] += sums[k][c] / static_cast<double>(spp);
+  }
+  return true;
+}
+
+}  // namespace limn
