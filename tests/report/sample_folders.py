@@ -268,7 +268,7 @@ def fitting(folder, status="done"):
         "warnings": [],
         "history": [
             {"step": s, "loss": v, "stderr": 1e-4 if s else None, "halvings": s // 44, "seconds": 1,
-             "values": {"clay.reflectance": 0.5 + s / 400}}
+             "sigma": 0.1 if s < 9 else 0, "values": {"clay.reflectance": 0.5 + s / 400}}
             for s, v in enumerate(loss)
         ],
         "snapshots": [

@@ -196,7 +196,8 @@ class TestReport(unittest.TestCase):
         self.assertIn("clay.reflectance: 0.6123", page)
         self.assertIn("1 steps were halved", page)
         # The loss to its last step, where it is below zero; the scalar; distances.
-        self.assertEqual(page.count("<svg"), 3)
+        self.assertEqual(page.count("<svg"), 4)
+        self.assertIn("Blur: sigma", page)
         self.assertIn("loss over 45 steps, with its standard error; an unbiased estimate, below zero"
                       " at the 6 steps with a mark", page)
         self.assertIn("<td>0.59750</td>", page)  # after 40 steps

@@ -72,7 +72,8 @@ class FitSection(Section):
         return self.gallery(cards, wide=True) if len(cards) > 1 else None
 
     def _blur(self):
-        sigmas = [(h.number("step"), h.number("sigma")) for h in self.history if h.number("sigma")]
+        sigmas = [(h.number("step"), h.number("sigma")) for h in self.history
+                  if h.has("sigma") and h.number("sigma")]
         if not sigmas:
             return None
         return join(element("h3", "Blur: sigma"),
