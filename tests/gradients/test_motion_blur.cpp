@@ -260,6 +260,38 @@ TEST(MotionBlur, AgreesInReverseMode) {
   }
 }
 
+// A motion of all vertices, as one parameter and as the sum over the derivatives of each. Those are
+// by positions at the reference time, while a parameter's velocities are turned to each time.
+TEST(MotionBlur, HasVerticesOfTheReferenceTimeInReverseMode) {
+  const TempFiles files;
+  const Scene scene = moving(files);
+  std::vector<Vec3d> velocities;
+  std::string lines;
+  for (size_t v = 0; v < scene.shape(ShapeId(1)).mesh.weld.size(); ++v) {
+    const double i = static_cast<double>(v);
+    velocities.push_back({std::sin(1 + 3 * i), std::cos(2 * i), std::sin(5 * i)});
+    const Vec3d& d = velocities.back();
+    lines += fmt::format("{} {} {}\n", d.x, d.y, d.z);
+  }
+  BackwardOptions options;
+  const std::string one = "cube.vertex_positions:" + files.write("velocities.txt", lines);
+  options.parameters = {one, "cube.vertex_positions"};
+  RunSettings settings;
+  settings.spp = 16;
+  Image adjoint(16, 16, 3);
+  std::fill(adjoint.data.begin(), adjoint.data.end(), 1.0f);
+  const BackwardResult result = backward(scene, adjoint, options, settings);
+  const Moments& each = result.of("cube.vertex_positions").moments;
+  ASSERT_EQ(each.size(), 3 * velocities.size());
+  double sum = 0;
+  for (size_t v = 0; v < velocities.size(); ++v) {
+    for (int k = 0; k < 3; ++k) sum += each.mean(3 * v + k) * velocities[v][k];
+  }
+  const double expected = result.of(one).moments.mean(0);
+  EXPECT_NE(expected, 0);
+  EXPECT_NEAR(sum, expected, 1e-9 * std::fabs(expected));
+}
+
 TEST(MotionBlur, VelocityIsFitted) {
   const TempFiles files;
   Scene scene = moving(files);
