@@ -3,11 +3,14 @@
 // apart.
 //   dL_o/dtheta  +=  sum over edges of the integral over t of dL(t) f_s(w_t) J(t) dt,
 //   J(t) = det(w_0, w_1, v) / |w|^3
+// Samples of the film draw lines from edges beside glossy faces to vertices that the camera sees
+// (gloss_lines.h).
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <optional>
 
+#include "integrators/terms/gloss_lines.h"
 #include "integrators/terms/highlight_edges.h"
 #include "integrators/terms/mirror_edges.h"
 #include "integrators/terms/term_table.h"
@@ -32,7 +35,15 @@ class BoundaryTerm final : public Term {
     discontinuous_emitters_ = std::ranges::any_of(edges_.objects, [&](const EdgeMesh& mesh) {
       return is_textured_emitter(mesh) && (mesh.of_texture() || mesh.count(EdgeClass::kSharp) > 0);
     });
+    if (input.sampler.regions && !input.warps && !context_.straight_ways && scatters_again(0) &&
+        !is_left_out(0)) {
+      lines_.emplace(context_, edges_, input.free != nullptr);
+      if (lines_->empty()) lines_.reset();
+    }
   }
+
+  bool uses_film() const override { return lines_.has_value(); }
+  void sample_film(double u, const Rng& key, FilmSink& sink) const override;
 
   bool uses_vertices() const override { return !nothing_; }
   void add_at_vertex(const PathVertex& vertex, int samples, BoundarySink& sink) const override {
@@ -91,6 +102,7 @@ class BoundaryTerm final : public Term {
     const EdgeMesh& mesh = edges_.object(sample.edge.object);
     EdgeDraw draw{mesh, sample, part_, key};
     draw.roulette = roulette;
+    draw.share = 1 - share_of_lines(vertex, sample);
     add_edge_point(context_, vertex, draw, sink);
     if (!discontinuous_emitters_ || !part_.regions || !is_textured_emitter(mesh)) return;
     if (is_outline(mesh, sample.edge.edge, vertex.surface.p)) return;
@@ -102,6 +114,13 @@ class BoundaryTerm final : public Term {
     }
   }
 
+  double share_of_lines(const PathVertex& vertex, const EdgeSample& sample) const {
+    if (!lines_ || vertex.bounces > 0) return 0;
+    const auto seen = seen_vertex(context_.scene, vertex.surface.face, vertex.surface.p,
+                                  sample_lens(context_.scene.camera, vertex.key));
+    return seen ? lines_->share({sample.edge, sample.t, *seen}).share : 0;
+  }
+
   const PathContext& context_;
   const EdgeSamplerInput& edges_;
   const EdgeSampler& sampler_;
@@ -109,9 +128,40 @@ class BoundaryTerm final : public Term {
   RadiancePart part_;
   std::optional<MirrorEdges> mirrors_;        // none where there are no flat ones
   std::optional<HighlightEdges> highlights_;  // none where nothing mirrors
+  std::optional<GlossLines> lines_;           // none where no gloss is beside an edge
   bool nothing_;                              // warped directions follow all edges
   bool discontinuous_emitters_;               // some may be, by their textures
 };
+
+void BoundaryTerm::sample_film(double u, const Rng& key, FilmSink& sink) const {
+  constexpr double kLeastShare = 0.1;  // lines of less go on by roulette; not tuned
+  const Scene& scene = context_.scene;
+  Rng rng = key.at(Purpose::kShadow, 0);
+  RayCount rays;
+  const auto line = lines_->draw(u, rng, sample_lens(scene.camera, key), rays);
+  sink.cost().add(rays);
+  if (!line || !sink.at(line->vertex.seen.at)) return;
+  const auto& [face, q, seen] = line->vertex;
+  const auto [density, share] = lines_->share(*line);
+  if (!(rng.uniform() * kLeastShare < share)) return;
+  const auto surface = surface_on_ray<double>(scene, face, value(seen.ray.origin), seen.omega);
+  const Scattering<double> scattering(surface, -seen.omega, scene.shading);
+  if (scattering.black()) return;
+  RayCount shadow;
+  const bool hidden = is_hidden(context_, seen, face, shadow);
+  sink.cost().add(shadow);
+  if (hidden) return;
+  const EdgeSample sample{line->edge, line->t, density / std::max(share, kLeastShare), 1};
+  const EdgeMesh& mesh = edges_.object(line->edge.object);
+  const auto& ends = mesh.edge(line->edge.edge).vertices;
+  PathVertex vertex{surface, scattering, grey(1.0), {}, {}, 0, {}, key};
+  vertex.below = scattering.passes(mesh.position(ends[0]) * (1 - line->t) +
+                                   mesh.position(ends[1]) * line->t - q);
+  const SeenAlong along{seen.omega, seen.distance};
+  EdgeDraw draw{mesh, sample, part_, key};
+  draw.along = &along;
+  add_edge_point(context_, vertex, draw, sink);
+}
 
 void BoundaryTerm::add_before_highlights(const PathVertex& vertex, const EdgeQuery& query,
                                          int samples, HighlightEdges::View& view,

@@ -165,8 +165,8 @@ void ShadowTerm::add_samples(const PathVertex& vertex, int samples, BoundarySink
   sink.cost().samples += static_cast<uint64_t>(samples);
   Viewer viewer{vertex, query_at(vertex), {}};
   if (draws_lines() && vertex.bounces == 0) {
-    viewer.by_lines = lines_.vertex(vertex.surface.face, vertex.surface.p,
-                                    sample_lens(context_.scene.camera, vertex.key));
+    viewer.by_lines = seen_vertex(context_.scene, vertex.surface.face, vertex.surface.p,
+                                  sample_lens(context_.scene.camera, vertex.key));
   }
   for (Rng& rng : by_edges) {
     const uint32_t edge = edges_.choose(rng.uniform());

@@ -10,14 +10,6 @@ Vec3d ShadowLines::normal(FaceRef face) const {
   return normalize(cross(c[1] - c[0], c[2] - c[0]));
 }
 
-std::optional<SeenVertex> ShadowLines::vertex(FaceRef face, const Vec3d& q,
-                                              const LensPoint& lens) const {
-  if (is_lifted(context_.scene, face.shape)) return {};
-  const auto seen = film_point(context_.scene, face, q, lens);
-  if (!seen) return {};
-  return SeenVertex{face, q, *seen};
-}
-
 std::optional<SeenVertex> ShadowLines::draw(const ShadowEdge& edge, const ShadowPoint& point,
                                             double u_0, double u_1, const LensPoint& lens,
                                             RayCount& rays) const {
@@ -32,21 +24,18 @@ std::optional<SeenVertex> ShadowLines::draw(const ShadowEdge& edge, const Shadow
   ++rays.closest;
   if (!context_.tracer.closest(ray, hit)) return {};
   const auto met = surface_on_ray<double>(context_.scene, hit.face, ray.origin, ray.direction);
-  return vertex(hit.face, met.p, lens);
+  return seen_vertex(context_.scene, hit.face, met.p, lens);
 }
 
 double ShadowLines::density(const ShadowEdge& edge, const ShadowPoint& point,
                             const SeenVertex& vertex) const {
   if (is_lifted(context_.scene, point.face.shape)) return 0;
   const Vec3d n = normal(point.face), way = vertex.q - point.x;
-  const double height = dot(n, way), r2 = length_squared(way);
+  const double height = dot(n, way);
   // Lines leave x on the side that is lit.
   if (!(height * dot(n, edge.light->origin().through(point.x)) < 0)) return 0;
-  const Vec3d n_q = normal(vertex.face);
-  const FilmPoint& seen = vertex.seen;
-  const double area = std::fabs(height * dot(n_q, way)) / (kPi * r2 * r2);
-  const double solid_angle = area * seen.distance * seen.distance / std::fabs(dot(n_q, seen.omega));
-  return solid_angle / film_per_solid_angle(context_.scene.camera, seen.omega, seen.distance);
+  const double by_angle = std::fabs(height) / (kPi * std::sqrt(length_squared(way)));
+  return film_density(context_.scene, point.x, by_angle, vertex);
 }
 
 // Of draws at the vertex the density along the shadow is taken for 1 / (pi r), which it has

@@ -8,17 +8,10 @@
 // these lines do not end: vertices have all of theirs.
 #include <optional>
 
-#include "integrators/film/film_point.h"
+#include "integrators/terms/seen_vertex.h"
 #include "integrators/terms/shadow_edges.h"
 
 namespace limn {
-
-// A point q of a face, and where the camera sees it through a point of its lens.
-struct SeenVertex {
-  FaceRef face;
-  Vec3d q;
-  FilmPoint seen;
-};
 
 class ShadowLines {
  public:
@@ -30,8 +23,6 @@ class ShadowLines {
   ShadowLines(const PathContext& context, const EdgeSamplerInput& input)
       : context_(context), input_(input) {}
 
-  // A vertex that lines may find, if it is one.
-  std::optional<SeenVertex> vertex(FaceRef face, const Vec3d& q, const LensPoint& lens) const;
   // The vertex that a line from a point meets by uniform numbers, which may be hidden from the
   // camera.
   std::optional<SeenVertex> draw(const ShadowEdge& edge, const ShadowPoint& point, double u_0,
