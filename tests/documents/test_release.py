@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """tools/release: published figures that repeated ones contradict are named, others are not; --help
-of the scripts does nothing else.
+of the scripts does nothing else. tools/history: rows of commits that are not here.
 """
 
 import os
@@ -8,6 +8,8 @@ import random
 import subprocess
 import sys
 import unittest
+from importlib.machinery import SourceFileLoader
+from importlib.util import module_from_spec, spec_from_loader
 from types import SimpleNamespace
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
@@ -117,6 +119,14 @@ class Help(unittest.TestCase):
                                   text=True, check=False)
             self.assertEqual(done.returncode, 2, name)
             self.assertIn(argument, done.stderr)
+
+
+class History(unittest.TestCase):
+    def test_a_commit_that_the_repository_lacks_has_no_subject(self):
+        loader = SourceFileLoader("history", os.path.join(TOOLS, "history"))
+        history = module_from_spec(spec_from_loader("history", loader))
+        loader.exec_module(history)
+        self.assertEqual(history.subject_of("123456789abc-dirty"), "")
 
 
 if __name__ == "__main__":
