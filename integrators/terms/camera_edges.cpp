@@ -14,6 +14,11 @@ constexpr double kAllAround = 0.1;
 // The weight, beside that of a parameter, of edges seen through panes, which are alike in it. Not
 // tuned.
 constexpr double kAlike = 0.1;
+// The least of the share of either kind of edges that it would have if differences were alike. Not
+// tuned.
+constexpr double kLeastOfKind = 0.25;
+// Points of either kind whose differences are looked at. Not tuned.
+constexpr int kLooks = 128;
 
 Lanes larger(const Lanes& a, const Lanes& b) {
   Lanes result;
@@ -92,6 +97,7 @@ CameraEdges::CameraEdges(const PathContext& context, const EdgeSamplerInput& inp
   const Stopwatch watch;
   list();
   weigh({});
+  find_contrasts();
   moving_ = std::count_if(pieces_.begin(), pieces_.end(),
                           [](const Piece& piece) { return !is_zero(piece.weight); });
   list_seconds_ = watch.seconds();
@@ -216,36 +222,100 @@ void CameraEdges::add_pieces(uint32_t index, const FilmMotionAt& motion) {
   }
 }
 
-// Projected length times speed: exact but for the difference itself. Every parameter gets an equal
-// share of the samples, whatever its unit.
+double CameraEdges::emitted_at(const FilmEdge& edge) const {
+  if (edge.clip != FilmEdge::kNoClip) return 0;
+  double most = 0;
+  for (const FaceRef face : input_.object(edge.id.object).faces_around(edge.id.edge)) {
+    const Shape& shape = scene().shape(face.shape);
+    if (!shape.is_emitter) continue;
+    const Rgb<double> radiance = value(shape.radiance);
+    most = std::max(most, (radiance.r + radiance.g + radiance.b) / 3);
+  }
+  return most;
+}
+
+double CameraEdges::root_mean_square(bool of_emitters) const {
+  DiscreteDistribution choice;
+  for (const Piece& piece : pieces_) {
+    const FilmEdge& edge = edges_[piece.edge];
+    double share = 0;
+    for (int k = 0; k < lanes_; ++k) share += piece.weight[k];
+    choice.add(!edge.refracted && (emitted_at(edge) > 0) == of_emitters ? share : 0);
+  }
+  if (!(choice.sum() > 0)) return 0;
+  double squares = 0;
+  for (int i = 0; i < kLooks; ++i) {
+    const DiscreteDistribution::Draw draw = choice.sample((i + 0.5) / kLooks);
+    const FilmEdgePoint point = point_on(pieces_[draw.index], draw.fraction);
+    const double over = of_emitters ? emitted_at(point.edge) : 1;
+    RayCount rays;
+    Rgb<double> d;
+    MirrorFaces by;
+    try {
+      if (!difference_at(point, {0, 0, static_cast<uint64_t>(i)}, rays, d, by)) continue;
+    } catch (const UntraceableRay&) {  // samples will count it
+      continue;
+    }
+    if (is_finite(d)) squares += (d.r * d.r + d.g * d.g + d.b * d.b) / (3 * over * over * kLooks);
+  }
+  return std::sqrt(squares);
+}
+
+void CameraEdges::find_contrasts() {
+  const bool shines = std::ranges::any_of(
+      edges_, [&](const FilmEdge& edge) { return moves(edge) && emitted_at(edge) > 0; });
+  if (!shines || empty()) return;
+  of_emitters_ = root_mean_square(true);
+  of_others_ = root_mean_square(false);
+  weigh({});
+}
+
+double CameraEdges::contrast(const FilmEdge& edge) const {
+  if (!(of_emitters_ > 0 && of_others_ > 0)) return 1;
+  const double emitted = emitted_at(edge);
+  return emitted > 0 ? of_emitters_ * emitted : of_others_;
+}
+
+// Projected length times speed times the difference that kinds of edges have; a share goes without
+// the latter. Every parameter gets an equal share of the samples, whatever its unit.
 void CameraEdges::weigh(const FilmMotionAt& motion) {
   pieces_ = {};
   choice_ = {};
   for (uint32_t e = 0; e < edges_.size(); ++e) add_pieces(e, motion);
-  Lanes totals;
+  Lanes totals, contrasts;
   size_t refracted = 0;
   for (const Piece& piece : pieces_) {
     totals += piece.weight;
+    contrasts += piece.weight * contrast(edges_[piece.edge]);
     refracted += edges_[piece.edge].refracted;
   }
   for (const Piece& piece : pieces_) {
+    const double by = contrast(edges_[piece.edge]);
     double share = 0;
     for (int k = 0; k < lanes_; ++k) {
-      if (totals[k] > 0) share += piece.weight[k] / totals[k];
+      if (!(totals[k] > 0)) continue;
+      share +=
+          piece.weight[k] * (kLeastOfKind / totals[k] + (1 - kLeastOfKind) * by / contrasts[k]);
     }
     if (edges_[piece.edge].refracted) share += kAlike / static_cast<double>(refracted);
     choice_.add(share);
   }
 }
 
+FilmEdgePoint CameraEdges::point_on(const Piece& piece, double fraction) const {
+  FilmEdgePoint point{edges_[piece.edge], 0, {}, 0};
+  const FilmEdge& edge = point.edge;
+  point.s = piece.s0 + (piece.s1 - piece.s0) * fraction;
+  point.at.x = edge.x0 + (edge.x1 - edge.x0) * point.s;
+  point.at.y = edge.y0 + (edge.y1 - edge.y0) * point.s;
+  return point;
+}
+
 std::optional<FilmEdgePoint> CameraEdges::choose(double u, const LensPoint&) const {
   const DiscreteDistribution::Draw draw = choice_.sample(u);
   const Piece& piece = pieces_[draw.index];
-  FilmEdgePoint point{edges_[piece.edge], 0, {}, 0};
+  FilmEdgePoint point = point_on(piece, draw.fraction);
   const FilmEdge& edge = point.edge;
-  point.s = piece.s0 + (piece.s1 - piece.s0) * draw.fraction;
-  point.at.x = edge.x0 + (edge.x1 - edge.x0) * point.s;
-  point.at.y = edge.y0 + (edge.y1 - edge.y0) * point.s;
   if (edge.refracted && !bend(point, {})) return {};
   point.density = draw.probability / (edge.length * (piece.s1 - piece.s0));
   return point;

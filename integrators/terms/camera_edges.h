@@ -21,6 +21,13 @@ class CameraEdges final : public FilmEdges {
   std::optional<FilmEdgePoint> choose(double u, const LensPoint& lens) const override;
 
  private:
+  // A part of an edge that is drawn alike: [s0, s1] of it.
+  struct Piece {
+    uint32_t edge;
+    double s0, s1;
+    Lanes weight;
+  };
+
   static bool moves(const FilmEdge& edge) {
     return edge.refracted || !is_zero(edge.speed0) || !is_zero(edge.speed1);
   }
@@ -39,22 +46,24 @@ class CameraEdges final : public FilmEdges {
   // Of the edges from the first on, of one view.
   void find_in_line(size_t first);
   void keep_seen(const FilmRegions& visible);
+  // What a face around the edge emits, the brightest, as a mean of channels; 0: nothing.
+  double emitted_at(const FilmEdge& edge) const;
+  // Looks at differences across some edges of emitters and across some others.
+  void find_contrasts();
+  double root_mean_square(bool of_emitters) const;
+  double contrast(const FilmEdge& edge) const;
+  FilmEdgePoint point_on(const Piece& piece, double fraction) const;
   void weigh(const FilmMotionAt& motion);
   void add_pieces(uint32_t edge, const FilmMotionAt& motion);
-
-  // A part of an edge that is drawn alike: [s0, s1] of it.
-  struct Piece {
-    uint32_t edge;
-    double s0, s1;
-    Lanes weight;
-  };
 
   int lanes_;
   const FilmRegions* visible_;
   bool lists_all_ = false;
   std::vector<FilmEdge> edges_;  // that move, or all
   size_t moving_ = 0;
-  std::vector<FilmLine> resting_;  // until what is in line with them is found
+  // The radiance difference to expect across an edge: of emitters, over what they emit.
+  double of_emitters_ = 0, of_others_ = 0;  // both 0: alike
+  std::vector<FilmLine> resting_;           // until what is in line with them is found
   Parting parting_;
   std::vector<Piece> pieces_;
   DiscreteDistribution choice_;  // of a piece

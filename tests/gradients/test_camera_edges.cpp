@@ -1,0 +1,61 @@
+// How the camera's edges are chosen: by how much radiance differs across them, too.
+#include <gtest/gtest.h>
+
+#include "integrators/paths/traced_scene.h"
+#include "integrators/terms/camera_edges.h"
+#include "integrators/terms/term.h"
+#include "limn/core/parameter.h"
+#include "limn/edgetree/edge_sampler_types.h"
+#include "support/meshes.h"
+#include "support/scenes.h"
+
+namespace limn {
+namespace {
+
+// The share of points that lie on the edges of the lamp, a small square beside a ball of many
+// edges, and what lies there of the length of all.
+struct LampShare {
+  double points, length;
+};
+LampShare share_of_lamp(const std::string& radiance) {
+  const TempFiles files;
+  SceneParts parts;
+  parts.width = parts.height = 32;
+  parts.body = obj_shape("ball", write_mesh(files, "ball.obj", icosphere_mesh(2)), true, 0.8,
+                         {0.2, 1, 0}, diffuse("clay", "0.7, 0.5, 0.3")) +
+               square("lamp", 0.05, 0, {-1.2, 1.6, 0.5}, area_light("glow", radiance)) +
+               constant_light("sky", "0.2, 0.3, 0.4");
+  Scene scene = make_scene(files, parts);
+  find_parameter(scene, "sensor.translate.x").seed(scene, 0);
+  const TracedScene traced(scene, 1, {.edges = true});
+  TermInput input(traced.context(), 1, {1, 1, 1, 1}, edge_sampler_type("silhouettes"), 1, false);
+  const CameraEdges edges(traced.context(), input.edges(), 1);
+  constexpr int kPoints = 4096;
+  LampShare share{0, 0};
+  double length = 0;
+  for (int i = 0; i < kPoints; ++i) {
+    const auto point = edges.choose((i + 0.5) / kPoints, {});
+    if (!point) continue;
+    const bool is_lamp = scene.shape(point->edge.shape).id == "lamp";
+    share.points += is_lamp / static_cast<double>(kPoints);
+    share.length += is_lamp / point->density;
+    length += 1 / point->density;
+  }
+  share.length /= length;
+  return share;
+}
+
+TEST(CameraEdges, OfBrightEmittersAreChosenMoreOften) {
+  const LampShare bright = share_of_lamp("500, 500, 500"),
+                  dim = share_of_lamp("0.001, 0.001, 0.001");
+  // Whatever is chosen, densities tell the length of all that may be.
+  EXPECT_NEAR(bright.length, dim.length, 0.1 * dim.length);
+  EXPECT_LT(bright.length, 0.1);
+  EXPECT_GT(bright.points, 0.7);
+  EXPECT_LT(bright.points, 1 - 0.2);  // the rest has a share that does not depend on differences
+  // As dark before the sky as many edges of the ball.
+  EXPECT_LT(dim.points, 0.1);
+}
+
+}  // namespace
+}  // namespace limn
