@@ -13,6 +13,8 @@ namespace limn {
 
 namespace {
 
+constexpr std::string_view kLfsPointer = "version https://git-lfs.github.com/spec/";
+
 // Removes a leading plus sign, which from_chars does not accept.
 std::string_view without_plus(std::string_view text) {
   if (text.size() > 1 && text[0] == '+' && text[1] != '-') text.remove_prefix(1);
@@ -68,6 +70,9 @@ std::string read_whole_file(const std::string& file) {
   std::string content(size, '\0');
   stream.read(content.data(), static_cast<std::streamsize>(size));
   if (static_cast<uintmax_t>(stream.gcount()) != size) fail("it ended while it was read");
+  if (content.starts_with(kLfsPointer)) {
+    throw InputError({file}, "is a pointer of Git LFS in place of the file (git lfs pull gets it)");
+  }
   return content;
 }
 

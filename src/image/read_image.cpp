@@ -73,6 +73,7 @@ StoredImage read_stored_image(const std::string& file) {
     if (!first.starts_with(format.begins)) continue;
     return format.read(file, read_whole_file(file));
   }
+  if (first.starts_with("version ")) read_whole_file(file);  // says what it is
   throw InputError({file}, "is no image that is read (known: BMP, EXR, JPEG, PNG, Radiance RGBE)");
 }
 

@@ -24,15 +24,20 @@ struct IntegratorType {
 const std::vector<IntegratorType>& types() {
   const std::vector<std::string> projective = {"guiding", "guiding_proj", "guiding_rounds",
                                                "sppc",    "sppi",         "sppp"};
+  const std::vector<std::string> reparam = {"reparam_antithetic", "reparam_exp",  "reparam_kappa",
+                                            "reparam_max_depth",  "reparam_rays", "reparam_unroll"};
   static const std::vector<IntegratorType> all = {
       {"aov", -1, false, false, true, {}, {"aovs"}},
       {"direct", 2, true, false, false, {"bsdf_samples", "emitter_samples", "shading_samples"}},
       {"direct_projective", 2, true, false, false, projective},
+      {"direct_reparam", 2, true, false, false, reparam},
       {"moment", -1, false, false, true},
       {"path", -1},
       {"prb", 6},
       {"prb_basic", 6},
       {"prb_projective", 6, false, false, false, projective},
+      {"prb_reparam", 6, false, false, false, reparam},
+      {"prbvolpath", 6, false, true},
       {"ptracer", -1, false, false, false, {"samples_per_pass"}},
       {"volpath", -1, false, true},
       {"volpathmis", -1, false, true, false, {"use_spectral_mis"}},

@@ -1,4 +1,4 @@
-// Renames the parameters of formats before 2.0.0.
+// Renames the parameters of formats before 2.0.0, and replaces types that are gone.
 #include "src/scene_file/old_format.h"
 
 #include <algorithm>
@@ -64,23 +64,71 @@ void join_uv(XmlElement& texture) {
   texture.children.push_back(std::move(to_uv));
 }
 
+// Objects that Mitsuba 3 lacks, and what images like theirs come from.
+struct Replacement {
+  const char* tag;
+  std::vector<std::string> types;
+  const char* type;               // in their place
+  std::vector<std::string> kept;  // of their named parameters
+};
+
+const std::vector<Replacement>& replacements() {
+  static const std::vector<Replacement> all = {
+      {"integrator",
+       {"bdpt", "erpt", "mlt", "photonmapper", "pssmlt", "sppm"},
+       "path",
+       {"maxDepth", "rrDepth"}},
+      {"film",
+       {"ldrfilm"},
+       "hdrfilm",
+       {"width", "height", "cropOffsetX", "cropOffsetY", "cropWidth", "cropHeight"}},
+      {"sampler", {"halton", "hammersley", "sobol"}, "independent", {"sampleCount"}},
+  };
+  return all;
+}
+
+bool is_among(const std::vector<std::string>& list, const std::string& word) {
+  return std::find(list.begin(), list.end(), word) != list.end();
+}
+
+void replace_type(XmlElement& element, std::vector<std::string>& warnings) {
+  XmlAttribute* const type = attribute(element, "type");
+  if (!type) return;
+  for (const Replacement& r : replacements()) {
+    if (element.name != r.tag || !is_among(r.types, type->value)) continue;
+    const bool is_film = element.name == "film";
+    warnings.push_back(format_warning(element.where, element.name + " \"" + type->value +
+                                                         "\" is read as " + r.type +
+                                                         ", without parameters of its own"));
+    type->value = r.type;
+    std::erase_if(element.children, [&](const XmlElement& child) {
+      const XmlAttribute* name = child.find("name");
+      return name ? !is_among(r.kept, name->value) : !is_film;  // a film keeps its filter
+    });
+  }
+}
+
+// Parameters that Mitsuba 3 lacks.
+void drop_parameters(XmlElement& element, std::vector<std::string>& warnings) {
+  static const std::vector<std::string> kDropped = {"attachLog", "highQualityEdges",
+                                                    "strictNormals"};
+  std::erase_if(element.children, [&](const XmlElement& child) {
+    const XmlAttribute* name = child.find("name");
+    if (child.name != "boolean" || !name || !is_among(kDropped, name->value)) return false;
+    if (has_value(child, "value", "true")) {
+      warnings.push_back(format_warning(child.where, name->value + " is ignored"));
+    }
+    return true;
+  });
+}
+
 void upgrade_element(XmlElement& element, std::vector<std::string>& warnings) {
   if (element.name == "lookAt") element.name = "lookat";
   if (element.name != "default") {
     if (XmlAttribute* name = attribute(element, "name")) name->value = snake_case(name->value);
   }
-  if (element.name == "integrator" &&
-      (has_value(element, "type", "sppm") || has_value(element, "type", "photonmapper"))) {
-    XmlAttribute& type = *attribute(element, "type");
-    warnings.push_back(format_warning(
-        element.where,
-        "integrator \"" + type.value + "\" is read as path, without its parameters"));
-    type.value = "path";
-    std::erase_if(element.children, [](const XmlElement& child) {
-      const XmlAttribute* name = child.find("name");
-      return !name || (name->value != "maxDepth" && name->value != "rrDepth");
-    });
-  }
+  replace_type(element, warnings);
+  drop_parameters(element, warnings);
   const bool is_diffuse = element.name == "bsdf" && has_value(element, "type", "diffuse");
   for (XmlElement& child : element.children) {
     upgrade_element(child, warnings);

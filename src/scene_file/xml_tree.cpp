@@ -82,6 +82,18 @@ void convert_attributes(const pugi::xml_node& node, const TextPlaces& places, Xm
   }
 }
 
+// Spaces and line ends, and the spaces of width zero that editors leave.
+bool is_blank(std::string_view text) {
+  for (size_t i = 0; i < text.size();) {
+    const bool invisible = text.substr(i, 3) == "\u200b" || text.substr(i, 3) == "\ufeff";
+    if (!invisible && std::string_view(" \t\r\n").find(text[i]) == std::string_view::npos) {
+      return false;
+    }
+    i += invisible ? 3 : 1;
+  }
+  return true;
+}
+
 SourceLocation place_of_text(const pugi::xml_node& text, const TextPlaces& places) {
   const size_t begin = static_cast<size_t>(text.offset_debug());
   return places.at(places.text().find_first_not_of(" \t\r\n", begin));
@@ -98,7 +110,7 @@ XmlElement convert(const pugi::xml_node& node, const TextPlaces& places, int dep
   for (const pugi::xml_node& child : node.children()) {
     if (child.type() == pugi::node_element) {
       element.children.push_back(convert(child, places, depth + 1));
-    } else {
+    } else if (child.type() != pugi::node_pcdata || !is_blank(child.value())) {
       throw InputError(place_of_text(child, places),
                        "<" + element.name + ">: text between elements means nothing here");
     }

@@ -102,6 +102,8 @@ const std::vector<Mistake>& mistakes() {
        "a.obj:4:1: error: unknown statement \"F\" (known: bevel, c_interp, ctech, d_interp, f, g, "
        "l, lod, maplib, mg, mtllib, o, p, s, shadow_obj, stech, trace_obj, usemap, usemtl, v, vn, "
        "vp, vt)"},
+      {"ObjPointer", "a.obj", "version https://git-lfs.github.com/spec/v1\noid sha256:5e07\n",
+       "a.obj: error: is a pointer of Git LFS in place of the file (git lfs pull gets it)"},
       // Of a file that is none nothing is quoted.
       {"ObjOther", "a.obj", "root:x:0:0:root:/root:/bin/sh\n",
        "a.obj:1:1: error: this is no statement of an OBJ file (known: bevel, c_interp, ctech, "

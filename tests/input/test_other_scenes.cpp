@@ -181,7 +181,37 @@ TEST(OtherScenes, NamesOfEarlierFormats) {
   EXPECT_EQ(scene.shapes[0].bsdf->describe(), "diffuse, reflectance 0.25 0.25 0.25");
   EXPECT_EQ(warnings,
             std::vector<std::string>{"string:2:1: warning: integrator \"sppm\" is read as "
-                                     "path, without its parameters"});
+                                     "path, without parameters of its own"});
+}
+
+TEST(OtherScenes, TypesThatAreGone) {
+  std::vector<std::string> warnings;
+  const Scene scene = read_scene_text(
+      "<scene version=\"0.5.0\"><integrator type=\"path\"><integer name=\"maxDepth\" value=\"9\"/>"
+      "<boolean name=\"strictNormals\" value=\"true\"/></integrator><sensor type=\"perspective\">"
+      "<sampler type=\"sobol\"><integer name=\"sampleCount\" value=\"8\"/><integer "
+      "name=\"scramble\" "
+      "value=\"1\"/></sampler><film type=\"ldrfilm\"><integer name=\"width\" value=\"7\"/><string "
+      "name=\"fileFormat\" value=\"png\"/><float name=\"gamma\" value=\"2.2\"/><rfilter "
+      "type=\"tent\"/></film></sensor></scene>",
+      "", {}, &warnings);
+  EXPECT_EQ(scene.max_depth, 9);
+  EXPECT_EQ(scene.sample_count, 8);
+  EXPECT_EQ(scene.camera.width, 7);
+  EXPECT_EQ(scene.camera.height, 576);
+  EXPECT_EQ(scene.film.filter.kind, Filter::Kind::kTent);
+  EXPECT_EQ(warnings,
+            (std::vector<std::string>{
+                "string:1:84: warning: strictNormals is ignored",
+                "string:1:168: warning: sampler \"sobol\" is read as independent, without "
+                "parameters of its own",
+                "string:1:275: warning: film \"ldrfilm\" is read as hdrfilm, without parameters of "
+                "its own"}));
+  const Scene later = read_scene_text(
+      "<scene version=\"3.0.0\">\u200b\n<integrator type=\"prb_reparam\"><integer "
+      "name=\"reparam_rays\" value=\"8\"/></integrator><sensor type=\"perspective\"/></scene>",
+      "", {}, &warnings);
+  EXPECT_EQ(later.max_depth, 6);
 }
 
 TEST(OtherScenes, InstancesAreCopies) {

@@ -141,6 +141,8 @@ TEST(ImageFormats, HostileFilesAreRefused) {
   EXPECT_EQ(error(""), "cannot read: the file is empty");
   EXPECT_EQ(error("P6 1 1 255 abc"),
             "is no image that is read (known: BMP, EXR, JPEG, PNG, Radiance RGBE)");
+  EXPECT_EQ(error("version https://git-lfs.github.com/spec/v1\noid sha256:5e07\n"),
+            "is a pointer of Git LFS in place of the file (git lfs pull gets it)");
   EXPECT_EQ(error(png_of_size("\x80\0\0\0\0\0\0\1"s)),
             "the PNG file is truncated or damaged: PNG unsigned integer out of range");
   EXPECT_EQ(error(png_of_size("\x7f\xff\xff\xff\0\0\0\1"s)),
