@@ -14,6 +14,7 @@
 #include "integrators/compare/check_step.h"
 #include "integrators/terms/term.h"
 #include "limn/core/blur_tracer.h"
+#include "limn/core/field_error.h"
 #include "limn/core/moved.h"
 #include "limn/core/parameter.h"
 #include "limn/integrators/methods.h"
@@ -499,6 +500,11 @@ CheckResult check(const Scene& scene, const CheckOptions& options, const RunSett
                   const GradientRun& run) {
   const Method& method = options.method;
   check_options(options);
+  if (settings.seconds == 0 && settings.spp > kMostCheckSamples) {
+    throw FieldError("spp",
+                     fmt::format("a check takes {} at most: its second run takes twice as many",
+                                 kMostCheckSamples));
+  }
   // Before the search for a step.
   check_task(method, Task::kGradient);
   if (method->check) method->check(scene);

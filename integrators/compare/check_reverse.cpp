@@ -18,10 +18,11 @@ namespace limn {
 
 namespace {
 
+// Positive, so that what all pixels share shows beside their noise, and different in each.
 Image random_adjoint(const Film& film, uint64_t seed) {
   Image adjoint(film.crop_width, film.crop_height, 3);
   for (size_t i = 0; i < adjoint.data.size(); ++i) {
-    adjoint.data[i] = static_cast<float>(2 * Rng(seed, i, 0).uniform() - 1);
+    adjoint.data[i] = static_cast<float>(Rng(seed, i, 0).uniform());
   }
   return adjoint;
 }

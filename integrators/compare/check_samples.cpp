@@ -12,6 +12,7 @@ namespace {
 constexpr double kMostGrowth = 16;
 // The error aimed at, over the one requested: variances are known to some ten per cent. Not tuned.
 constexpr double kMargin = 0.85;
+constexpr double kLeastShare = 0.125;  // of the time. Not tuned.
 // With steps that shrink as n^-1/5 the variance of edges in differences goes with n^-4/5.
 constexpr double kVariancePower = 1.25;
 
@@ -22,25 +23,25 @@ constexpr double kVariancePower = 1.25;
 std::optional<CheckSamples> more_samples(const CheckCost& gradient, const CheckCost& differences,
                                          double factor, double seconds) {
   const CheckCost* const runs[2] = {&gradient, &differences};
-  double shares[2], sum = 0, before = 0;
+  double cost[2], spent[2], sum = 0, before = 0;
   for (int i = 0; i < 2; ++i) {
     const auto n = static_cast<double>(runs[i]->samples);
-    const double cost = std::max(runs[i]->seconds, 1e-9) / n;
-    const double variance = runs[i]->variance * n;
-    shares[i] = std::sqrt(variance / cost);
-    sum += std::sqrt(variance * cost);
+    cost[i] = std::max(runs[i]->seconds, 1e-9) / n;
+    spent[i] = std::sqrt(runs[i]->variance * n * cost[i]);
+    sum += spent[i];
     before += runs[i]->seconds;
   }
   const double most = std::min(seconds, kMostGrowth * before);
   if (most <= before || !(sum > 0)) return std::nullopt;
+  for (double& part : spent) part = std::max(part, kLeastShare * sum);
   const double wanted =
       (gradient.variance + differences.variance) * std::pow(kMargin * factor, 2 * kVariancePower);
-  const double scale = std::min(sum / wanted, most / sum);
-  const auto samples = [&](double share) {
-    return static_cast<int64_t>(
-        std::clamp(scale * share, double{kFirstCheckSamples}, double{1 << 30}));
+  const double scale = std::min(sum / wanted, most / (spent[0] + spent[1]));
+  const auto samples = [&](int i) {
+    return static_cast<int64_t>(std::clamp(scale * spent[i] / cost[i], double{kFirstCheckSamples},
+                                           double{kMostCheckSamples}));
   };
-  return CheckSamples{samples(shares[0]), samples(shares[1])};
+  return CheckSamples{samples(0), samples(1)};
 }
 
 }  // namespace limn

@@ -19,9 +19,13 @@ struct CheckCost {
 
 // The first run's: enough for variances.
 inline constexpr int64_t kFirstCheckSamples = 16;
+// At most: a second run takes twice as many, in an int.
+inline constexpr int64_t kMostCheckSamples = 1 << 29;
 
 // The samples of least time with which the error of the difference becomes `factor` times as large,
-// or the smallest error that takes `seconds` at most. Nothing where that is no longer run.
+// or the smallest error that takes `seconds` at most. Nothing where that is no longer run. Neither
+// takes less than an eighth of the time: a few samples may not hold the events that rule their
+// variance.
 std::optional<CheckSamples> more_samples(const CheckCost& gradient, const CheckCost& differences,
                                          double factor, double seconds);
 

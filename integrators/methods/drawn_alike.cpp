@@ -1,7 +1,9 @@
 // A BSDF that scatters as one does and draws directions as two others do.
 #include "integrators/methods/drawn_alike.h"
 
+#include <algorithm>
 #include <array>
+#include <vector>
 
 #include "limn/core/bsdf.h"
 #include "limn/core/image.h"
@@ -11,17 +13,21 @@ namespace {
 
 class DrawnAlike final : public Bsdf {
  public:
-  using Held = std::array<std::shared_ptr<Bsdf>, 3>;  // what scatters, and the two that draw
+  struct Held {
+    std::array<std::shared_ptr<Bsdf>, 3> bsdfs;  // what scatters, and the two that draw
+    std::vector<bool> moved;                     // which of their textures differ
+  };
   DrawnAlike(const Held& held, bool front) : held_(held) {
-    for (size_t i = 0; i < held.size(); ++i) sides_[i] = held[i]->side(front);
+    for (size_t i = 0; i < sides_.size(); ++i) sides_[i] = held.bsdfs[i]->side(front);
     if (front) back_ = std::make_shared<DrawnAlike>(held, false);
     if (!sides_[0]) return;
     lobes_ = sides_[0]->lobes();
-    int all = 0;
-    for (const Bsdf* side : sides_) all += side->texture_count();
-    // Where there is no room for the textures of all, they look up the same.
-    own_textures_ = all <= kMostTextures;
-    texture_count_ = own_textures_ ? all : sides_[0]->texture_count();
+    for (int k = 0; k < sides_[0]->texture_count(); ++k) {
+      textures_.push_back(&sides_[0]->texture(k));
+      for (auto& places : places_) places.push_back(k);
+    }
+    for (size_t i = 1; i < sides_.size(); ++i) add_moved_textures(i);
+    texture_count_ = static_cast<int>(textures_.size());
   }
 
   Rgb<double> eval(const Vec3<double>& n, const Vec3<double>& wi, const Vec3<double>& wo,
@@ -34,8 +40,8 @@ class DrawnAlike final : public Bsdf {
   }
   double pdf_solid_angle(const Vec3d& n, const Vec3d& wi, const Vec3d& wo,
                          const Rgb<double>* at) const override {
-    return 0.5 * (sides_[1]->pdf_solid_angle(n, wi, wo, part_of(at, 1)) +
-                  sides_[2]->pdf_solid_angle(n, wi, wo, part_of(at, 2)));
+    return 0.5 * (sides_[1]->pdf_solid_angle(n, wi, wo, AtSide(*this, 1, at).get()) +
+                  sides_[2]->pdf_solid_angle(n, wi, wo, AtSide(*this, 2, at).get()));
   }
   BsdfValue eval_with_pdf(const Vec3d& n, const Vec3d& wi, const Vec3d& wo,
                           const Rgb<double>* at) const override {
@@ -44,7 +50,7 @@ class DrawnAlike final : public Bsdf {
   std::optional<Vec3d> sample(const Vec3d& n, const Vec3d& wi, double u1, double u2,
                               const Rgb<double>* at) const override {
     const int i = u1 < 0.5 ? 1 : 2;
-    return sides_[i]->sample(n, wi, 2 * u1 - (i - 1), u2, part_of(at, i));
+    return sides_[i]->sample(n, wi, 2 * u1 - (i - 1), u2, AtSide(*this, i, at).get());
   }
   int smooth_rays(const Vec3<double>& n, const Vec3<double>& wi, SmoothRays<double>& rays,
                   const Rgb<double>* at) const override {
@@ -57,7 +63,7 @@ class DrawnAlike final : public Bsdf {
   double eta(const Rgb<double>* at) const override { return sides_[0]->eta(at); }
   const Bsdf* side(bool front) const override {
     const Bsdf* side = front ? this : back_.get();
-    return held_[0]->side(front) ? side : nullptr;
+    return held_.bsdfs[0]->side(front) ? side : nullptr;
   }
   Vec3d scattering_normal(const Vec3d& n, const Vec3d& wi, const Rgb<double>* at) const override {
     return sides_[0]->scattering_normal(n, wi, at);
@@ -68,54 +74,85 @@ class DrawnAlike final : public Bsdf {
   }
   // None: nothing more is to be moved.
   std::vector<ParameterRef> parameters() override { return {}; }
-  Texture& texture(int k) const override {
-    const Bsdf* const* side = sides_.data();
-    while (k >= (*side)->texture_count()) k -= (*side++)->texture_count();
-    return (*side)->texture(k);
-  }
-  std::string texture_name(int) const override { return held_[0]->describe(); }
+  Texture& texture(int k) const override { return *textures_[k]; }
+  std::string texture_name(int) const override { return held_.bsdfs[0]->describe(); }
   std::shared_ptr<Bsdf> clone() const override { return std::make_shared<DrawnAlike>(held_, true); }
-  std::string describe() const override { return held_[0]->describe(); }
+  std::string describe() const override { return held_.bsdfs[0]->describe(); }
 
  private:
   // Of the values of all textures those of one of the three.
-  const Rgb<double>* part_of(const Rgb<double>* at, int which) const {
-    if (!at || !own_textures_) return at;
-    for (int i = 0; i < which; ++i) at += sides_[i]->texture_count();
-    return at;
+  class AtSide {
+   public:
+    AtSide(const DrawnAlike& alike, int side, const Rgb<double>* at) : at_(at) {
+      if (!at || alike.texture_count_ == static_cast<int>(alike.places_[side].size())) return;
+      int k = 0;
+      for (const int place : alike.places_[side]) values_[k++] = at[place];
+      at_ = values_;
+    }
+    const Rgb<double>* get() const { return at_; }
+
+   private:
+    const Rgb<double>* at_;
+    Rgb<double> values_[kMostTextures];
+  };
+
+  // Those of a side that draws follow the ones that scatter; one used twice is looked up once.
+  void add_moved_textures(size_t side) {
+    const auto unmoved = static_cast<std::ptrdiff_t>(textures_.size());
+    for (size_t j = 0; j < held_.moved.size(); ++j) {
+      if (!held_.moved[j]) continue;
+      Texture* const moved = &held_.bsdfs[side]->texture(static_cast<int>(j));
+      for (size_t k = 0; k < places_[side].size(); ++k) {
+        if (&sides_[side]->texture(static_cast<int>(k)) != moved) continue;
+        const auto place = std::find(textures_.begin() + unmoved, textures_.end(), moved);
+        // Where there is no room, what draws sees the texture of what scatters.
+        if (place == textures_.end() && textures_.size() == kMostTextures) continue;
+        places_[side][k] = static_cast<int>(place - textures_.begin());
+        if (place == textures_.end()) textures_.push_back(moved);
+      }
+    }
   }
 
   Held held_;
   std::array<const Bsdf*, 3> sides_{};
-  std::shared_ptr<DrawnAlike> back_;  // of the front
-  bool own_textures_ = false;
+  std::shared_ptr<DrawnAlike> back_;        // of the front
+  std::vector<Texture*> textures_;          // what is looked up
+  std::array<std::vector<int>, 3> places_;  // in textures_, of each side's
 };
 
-bool differ(const Shape& a, const Shape& b) {
-  const auto refs = a.bsdf->parameters(), others = b.bsdf->parameters();
+bool differ(const std::vector<ParameterRef>& refs, const std::vector<ParameterRef>& others) {
   for (size_t i = 0; i < refs.size(); ++i) {
     for (size_t k = 0; k < refs[i].values.size(); ++k) {
       if (refs[i].values[k]->v != others[i].values[k]->v) return true;
     }
   }
-  for (int k = 0; k < a.bsdf->texture_count(); ++k) {
-    const TexelMap& map = a.bsdf->texture(k).texels_on(a.mesh);
-    if (map.map().width == 0) continue;
-    if (map.texels().data != b.bsdf->texture(k).texels_on(b.mesh).texels().data) return true;
-  }
   return false;
+}
+
+bool textures_differ(const Shape& a, const Shape& b, int k) {
+  Texture& texture = a.bsdf->texture(k);
+  Texture& other = b.bsdf->texture(k);
+  const TexelMap& map = texture.texels_on(a.mesh);
+  return differ(texture.parameters(), other.parameters()) ||
+         (map.map().width > 0 && map.texels().data != other.texels_on(b.mesh).texels().data);
 }
 
 }  // namespace
 
 void draw_alike(std::span<Scene> scenes, size_t first, size_t second) {
   for (size_t s = 0; s < scenes[first].shapes.size(); ++s) {
-    if (!differ(scenes[first].shapes[s], scenes[second].shapes[s])) continue;
-    const std::shared_ptr<Bsdf> drawn[2] = {scenes[first].shapes[s].bsdf,
-                                            scenes[second].shapes[s].bsdf};
+    const Shape& a = scenes[first].shapes[s];
+    const Shape& b = scenes[second].shapes[s];
+    DrawnAlike::Held held{{nullptr, a.bsdf, b.bsdf}, {}};
+    bool any = differ(a.bsdf->parameters(), b.bsdf->parameters());
+    for (int k = 0; k < a.bsdf->texture_count(); ++k) {
+      held.moved.push_back(textures_differ(a, b, k));
+      any = any || held.moved.back();
+    }
+    if (!any) continue;
     for (Scene& scene : scenes) {
-      std::shared_ptr<Bsdf>& bsdf = scene.shapes[s].bsdf;
-      bsdf = std::make_shared<DrawnAlike>(DrawnAlike::Held{bsdf, drawn[0], drawn[1]}, true);
+      held.bsdfs[0] = scene.shapes[s].bsdf;
+      scene.shapes[s].bsdf = std::make_shared<DrawnAlike>(held, true);
     }
   }
 }

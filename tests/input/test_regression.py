@@ -47,14 +47,14 @@ class Derivatives(unittest.TestCase):
                                               'name="to_world"><translate z="4"/></transform>'
                                               f'<bsdf type="{bsdf}"/></shape>'))
             # Nothing takes as little as this, so only the first runs are made.
-            options = ["-o", out, "--film", "8", "--seconds", "1e-9"]
+            options = ["-o", out, "--film", "8", "--seconds", "1e-6"]
             done = run("derivatives.py", folder, *options)
             self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
-            self.assertRegex(done.stdout, r"matt.xml +forward wall.bsdf.reflectance 64: agree")
+            self.assertRegex(done.stdout, r"matt.xml +forward wall.bsdf.reflectance: agree")
             self.assertRegex(done.stdout, r"\nsensor.fov +[0-2] ")
             self.assertIn("in 1 scenes (1 more have smooth lobes)", done.stdout)
             again = run("derivatives.py", folder, *options)
-            self.assertNotIn(" 64: ", again.stdout)
+            self.assertNotIn("matt.xml", again.stdout)
             file = os.path.join(out, "results.json")
             with open(file, encoding="utf-8") as stream:
                 text = stream.read()
@@ -62,7 +62,8 @@ class Derivatives(unittest.TestCase):
                 stream.write(text.replace('"verdict": "agree"', '"verdict": "disagree"', 1))
             wrong = run("derivatives.py", folder, *options)
             self.assertEqual(wrong.returncode, 1, wrong.stdout)
-            self.assertRegex(wrong.stdout, r" checks agree, \d+ more coarsely, 1 disagree")
+            self.assertRegex(wrong.stdout,
+                             r" checks agree, \d+ more coarsely, \d+ are zero, 1 disagree")
 
 
 class Regression(unittest.TestCase):

@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 """How often `limn check` rejects a correct gradient: many small runs with correct gradients.
 
-    tests/statistical/check_levels.py [--limn build/limn] [--runs 200] [--keep FILE.json]
+    tests/statistical/check_levels.py [--limn build/limn] [--runs 200] [--time S] [--keep FILE.json]
 
-Scenes of its own (huge floors, long shapes, tiny emitters, gloss) and those of scenes/closed_form, each
-with several parameters, every run with a seed and a number of samples of its own. Prints the
-verdicts, and how p-values and the z-scores of the whole image are spread: a level of 1e-4 shows
-nothing in 200 runs, but p < 0.05 must come in about 5 % of them or less.
+Scenes of its own (huge floors, long shapes, tiny emitters, gloss) and those of scenes/closed_form,
+each with several parameters, every run with a seed and a number of samples, or a limit of time, of
+its own. Prints the verdicts, and how p-values and the z-scores of the whole image are spread: a
+level of 1e-4 shows nothing in 200 runs, but p < 0.05 must come in about 5 % of them or less. The
+deviation of all windows' z should be 1 or less, also where gradients have few samples.
 """
 import argparse
 import json
@@ -117,11 +118,11 @@ def write_scenes(folder):
     return jobs
 
 
-def run(limn, file, parameter, seed, spp, folder):
+def run(limn, file, parameter, seed, samples, folder):
     figures = folder / 'check.json'
     figures.unlink(missing_ok=True)
     result = subprocess.run(
-        [limn, 'check', file, '--wrt', parameter, '--seed', str(seed), '--spp', str(spp), '--quiet',
+        [limn, 'check', file, '--wrt', parameter, '--seed', str(seed), *samples, '--quiet',
          '--json', figures], capture_output=True, text=True, cwd=file.parent, check=False)
     if not figures.exists():
         return {'status': result.returncode, 'error': result.stderr}
@@ -138,6 +139,13 @@ def report(rows):
     for r in right:
         if r['status'] == 1:
             print('  rejected:', r['scene'], r['wrt'], 'seed', r['seed'], 'spp', r['spp'])
+    for name, least, most in (('few', 0, 31), ('more', 32, 1e9)):
+        z = [(r['windows']['count'], r['windows']['deviation'], r['windows']['mean']) for r in right
+             if 'windows' in r and least <= r['spp'] <= most]
+        if z:
+            square = sum(n * (d * d + m * m) for n, d, m in z) / sum(n for n, _, _ in z)
+            print(f'z of windows where gradients have {name} samples ({len(z)} runs): '
+                  f'deviation {math.sqrt(square):.2f}')
     for name, values in (
             ('p', [r['p'] for r in right if 'p' in r]),
             ('p of the whole image', [math.erfc(abs(r['z_sum']) / math.sqrt(2)) for r in right])):
@@ -152,6 +160,7 @@ def main():
     options.add_argument('--limn', default=str(ROOT / 'build' / 'limn'))
     options.add_argument('--runs', type=int, default=200)
     options.add_argument('--spp', type=int, nargs='+', default=[8, 16, 32, 64])
+    options.add_argument('--time', type=float, help='seconds of each run, in place of --spp')
     options.add_argument('--keep', help='write every run to this file')
     arguments = options.parse_args()
     limn = os.path.abspath(arguments.limn)
@@ -163,8 +172,9 @@ def main():
             # All scenes in turn, with other seeds and samples in every round.
             file, parameter = jobs[k % len(jobs)]
             spp = arguments.spp[(k + k // len(jobs)) % len(arguments.spp)]
+            samples = ['--time', str(arguments.time)] if arguments.time else ['--spp', str(spp)]
             rows.append({'scene': file.name, 'wrt': parameter, 'seed': k, 'spp': spp,
-                         **run(limn, file, parameter, k, spp, folder)})
+                         **run(limn, file, parameter, k, samples, folder)})
             if arguments.keep:
                 pathlib.Path(arguments.keep).write_text(json.dumps(rows, indent=1))
             print(f'\r{k + 1} of {arguments.runs}', end='', file=sys.stderr, flush=True)

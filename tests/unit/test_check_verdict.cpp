@@ -9,6 +9,7 @@
 #include "integrators/compare/check_samples.h"
 #include "integrators/compare/edge_events.h"
 #include "integrators/methods/hair_gaps.h"
+#include "limn/core/field_error.h"
 #include "limn/core/rng.h"
 #include "limn/integrators/backward.h"
 #include "limn/integrators/run.h"
@@ -252,6 +253,29 @@ TEST(CheckSamples, AreOfLeastError) {
   ASSERT_TRUE(enough);
   EXPECT_LT(static_cast<double>(enough->gradient), 1500);
   EXPECT_FALSE(more_samples(gradient, differences, 0.5, 5));
+}
+
+// What looks like no noise in a few samples is looked at for an eighth of the time.
+TEST(CheckSamples, AreSomeWhereNoNoiseShows) {
+  const auto samples = more_samples({16, 1, 0}, {16, 3, 1}, 1e-6, 60);
+  ASSERT_TRUE(samples);
+  EXPECT_NEAR(static_cast<double>(samples->gradient), 16 * 60 / 9.0, 1);
+  EXPECT_NEAR(static_cast<double>(samples->differences), 16 * (60 - 60 / 9.0) / 3, 1);
+}
+
+// A second run takes twice as many.
+TEST(CheckSamples, AreNotMoreThanTwiceInAnInt) {
+  const TempFiles files;
+  Planted planted = planted_term(files, "forest", "camera", 1, 2);
+  RunSettings settings;
+  settings.spp = (1 << 29) + 1;
+  try {
+    check(planted.scene, planted.options, settings, planted.run);
+    FAIL();
+  } catch (const FieldError& e) {
+    EXPECT_EQ(e.field, "spp");
+    EXPECT_EQ(e.message, "a check takes 536870912 at most: its second run takes twice as many");
+  }
 }
 
 // Of what a check with a limit of time takes, the gradient's noise is no more than it must be.

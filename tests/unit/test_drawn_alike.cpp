@@ -2,6 +2,7 @@
 // that only one of them scatters is not lost; differences have the noise of the derivative.
 #include "integrators/methods/drawn_alike.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -9,6 +10,7 @@
 #include "limn/core/bsdf.h"
 #include "limn/core/parameter.h"
 #include "limn/core/rng.h"
+#include "limn/core/surface_point.h"
 #include "limn/integrators/differences.h"
 #include "limn/integrators/gradient.h"
 #include "support/meshes.h"
@@ -84,6 +86,46 @@ TEST(DrawnAlike, LosesNoLight) {
     // The lamp's material is the same in both.
     EXPECT_EQ(scenes[0].shapes[1].bsdf->describe(), scene.shapes[1].bsdf->describe());
   }
+}
+
+// One texture of many moves: what draws looks up its own.
+TEST(DrawnAlike, HasRoomForManyTextures) {
+  const TempFiles files;
+  std::string bsdf = R"(<bsdf type="principled" id="paint">)";
+  for (const char* name : {"roughness", "metallic", "anisotropic", "spec_tint", "sheen",
+                           "sheen_tint", "clearcoat", "clearcoat_gloss", "flatness"}) {
+    bsdf += fmt::format(R"(<texture type="checkerboard" name="{}"><float name="color0" value="0.3"/>
+        <float name="color1" value="0.6"/></texture>)",
+                        name);
+  }
+  const Scene scene = scene_of(files, bsdf + "</bsdf>");
+  const Parameter parameter = find_parameter(scene, "paint.roughness.color0");
+  std::vector<Scene> scenes{parameter.moved(scene, 0.2), parameter.moved(scene, -0.2),
+                            parameter.moved(scene, 0.1)};
+  const Vec3d n{0, 0, 1}, wi = normalize(Vec3d{0.5, 0.2, 0.7}), wo = normalize(Vec3d{-0.4, 0, 0.7});
+  const auto pdfs = [&](double b) {
+    std::vector<double> list;
+    for (const Scene& one : scenes) {
+      const Shape& floor = one.shapes[0];
+      Rgb<double> at[kMostTextures];
+      floor.bsdf->side(true)->resolve(texture_point<double>(floor.mesh, FaceId(0), {b, b}), at);
+      list.push_back(floor.bsdf->side(true)->pdf_solid_angle(n, wi, wo, at));
+    }
+    return list;
+  };
+  int moved = 0;
+  std::vector<std::vector<double>> own;
+  for (const double b : {0.1, 0.3}) own.push_back(pdfs(b));
+  draw_alike(scenes, 0, 1);
+  for (const double b : {0.1, 0.3}) {
+    const std::vector<double>& before = own[b > 0.2];
+    const std::vector<double> alike = pdfs(b);
+    moved += before[0] != before[1];
+    EXPECT_EQ(alike[0], alike[1]);
+    EXPECT_EQ(alike[0], alike[2]);
+    EXPECT_NEAR(alike[0], 0.5 * (before[0] + before[1]), 1e-12 * alike[0]);
+  }
+  EXPECT_EQ(moved, 1);
 }
 
 TEST(DrawnAlike, LeavesTheNoiseOfTheDerivative) {

@@ -5,18 +5,20 @@
         [--minutes N] [--path DIR] [-D name=value] [--at-least N]
 
 Scenes: those that limn opens (census.py), without smooth lobes (edges seen by way of these are
-missing, which `check` says itself). Copies of their XML have films of N by N pixels (16) without a
+missing, which `check` says itself). Copies of their XML have films of N by N pixels (8) without a
 crop. In each, one parameter of each kind that `limn info` lists is checked twice: against finite
 differences, and reverse mode against forward mode. A kind is the last part of a name, with its
 owner where that is a sensor or a light.
 
-A check that cannot tell is repeated with the samples that it asks for, cheapest first, as long as
-that takes at most --seconds (20) of processor time by what the last run took. Beyond that,
-up to three parameters of the kind are tried, and the cheapest continues. An array moves along one field
-(vertices by the same vector, texels by the same amount), or by one of its numbers.
-A reverse check is conclusive if an error as large as the derivative would show. A forward check is
-so if an error of a fifth of each term would; "agree coarsely" says that one as large as the whole
-derivative would have shown, which takes less time and is asked for first.
+All kinds of a scene share a reverse run, and those that it cannot tell a longer one. A forward
+check takes `--time` of FIRST_SECONDS, which grows to --seconds (12) at most where it cannot tell,
+those that want least first. Where a derivative is zero without noise, up to three parameters of the
+kind are tried. An array moves along one field (vertices by the same vector, texels by the same
+amount), or by one of its numbers; in reverse mode along a random one.
+
+Forward verdicts are those of `check`, which tells where an error of a tenth of all terms'
+magnitudes would show; "agree coarsely" says that one as large as the whole derivative would.
+A reverse check agrees if an error as large as the derivative would show.
 
 Results are kept in FOLDER/results.json (out/derivatives) and a later call goes on from there; after
 a change of limn, remove it. The exit status is 1 where a check disagrees, or fewer than --at-least
@@ -31,7 +33,6 @@ import json
 import math
 import os
 import re
-import resource
 import subprocess
 import sys
 import time
@@ -43,18 +44,21 @@ import census  # noqa: E402
 import common  # noqa: E402
 import exr  # noqa: E402
 
-FIRST_SPP = 64
-MOST_GROWTH = 16  # of samples, from run to run
+FIRST_SECONDS = 1.5
+GROWTH = 4  # of the time, from run to run
+REVERSE_SPP = 64
 TRIES = 3
 # Quantiles of a normal score: the two-sided level of `check`, 1e-4, and 95 % power.
 VISIBLE = 3.89 + 1.64
 SIZE = re.compile(r'(<integer\s+name\s*=\s*"(?:width|height)"\s+value\s*=\s*)"[^"]*"')
 CROP = re.compile(r'<integer\s+name\s*=\s*"crop_\w+"[^>]*>')
 SMOOTH = re.compile(r"\b(conductor|dielectric|thindielectric|plastic)\b")
-# Of what a check can see, by its samples (integrators/compare/check.cpp).
-SAMPLES_POWER = 2.5
-COARSELY = "agree coarsely"
+# Of what a check can see, by its time (integrators/compare/check.cpp).
+TIME_POWER = 2.5
+WANTED = 0.1  # of an error that shows, over all terms' magnitudes
+COARSELY, ZERO = "agree coarsely", "agree: zero"
 FORWARD, REVERSE = "forward", "reverse"
+DECIDED = ("disagree", "agree", "not complete")
 
 
 def copy_scenes(source, target, pixels):
@@ -129,35 +133,37 @@ def direction_of(folder, name, size, description):
                    ".0" if name.endswith(".displacement") else ".0.r")
 
 
-def timed(command):
-    """What a command did, and its processor seconds."""
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return done, sum(getattr(after, key) - getattr(before, key) for key in ("ru_utime", "ru_stime"))
-
-
 def forward_result(report):
-    needed = report["needed_spp"]
-    verdict, visible = report["verdict"], report["visible"].get("total")
-    coarse = report["spp"] * max(1, visible if visible is not None else math.inf)**SAMPLES_POWER
-    if verdict == "cannot tell" and coarse <= report["spp"] and not report["bends"]:
+    verdict, within = report["verdict"], report["within"]
+    visible = report["visible"].get("total")
+    if verdict == "agree" and not report["gradient_sum_stderr"] and within == 0:
+        verdict = ZERO
+    if verdict == "cannot tell" and not report["bends"] and visible and visible <= 1:
         verdict = COARSELY
-    keys = ("verdict", "p", "gradient_sum", "gradient_sum_stderr", "difference_sum",
-            "difference_sum_stderr", "smallest_at", "suspect", "bends")
-    return {"needed": math.inf if report["bends"] or not needed else needed,
-            **{key: report[key] for key in keys if key in report},
-            "verdict": verdict, "coarse": coarse, "visible": visible}
+    keys = ("spp", "within", "p", "gradient_sum", "gradient_sum_stderr", "difference_sum",
+            "difference_sum_stderr", "smallest_at", "suspect", "bends", "step")
+    growth = max(1, within / WANTED)**TIME_POWER if within is not None else math.inf
+    return {"growth": math.inf if report["bends"] else growth,
+            **{key: report[key] for key in keys if key in report}, "verdict": verdict}
 
 
-def reverse_result(report, spp):
-    error = math.hypot(report["forward_stderr"] or math.inf, report["reverse_stderr"] or math.inf)
-    ratio = VISIBLE * error / max(abs(report["forward"]), abs(report["reverse"]), 1e-300)
+def reverse_result(report):
+    errors = report["forward_stderr"] or 0, report["reverse_stderr"] or 0
+    largest = max(abs(report["forward"]), abs(report["reverse"]))
     verdict = report["verdict"]
-    if verdict == "agree" and ratio > 1 and error > 0:
+    if verdict == "agree" and VISIBLE * math.hypot(*errors) > largest:
         verdict = "cannot tell"
-    return {"verdict": verdict, "needed": min(1e12, spp * ratio**2),
-            **{key: report[key] for key in ("p", "z", "forward", "reverse")}}
+    elif verdict == "agree" and largest == 0:
+        verdict = ZERO
+    return {"verdict": verdict, **{key: report[key] for key in ("p", "z", "forward", "reverse")}}
+
+
+def first_of(runs, *verdicts):
+    for verdict in verdicts:
+        for run in runs:
+            if run["verdict"] == verdict:
+                return run
+    return None
 
 
 class Check:
@@ -166,38 +172,28 @@ class Check:
     def __init__(self, scene, kind, mode, candidates, kept):
         self.scene, self.kind, self.mode, self.candidates = scene, kind, mode, candidates
         self.runs = kept  # {parameter: the last result}
-        self.rank = 0  # in place of seconds that are not known: the first of every kind come first
+        self.rank = 0  # of those without a run: the first of every kind come first
 
     def result(self):
         """The one that decides, or has come nearest to that."""
-        runs = list(self.runs.values())
-        for verdict in ("disagree", "agree", "not complete", COARSELY):
-            for run in runs:
-                if run["verdict"] == verdict:
-                    return run
-        runs.sort(key=lambda run: run.get("needed", math.inf))
-        return runs[0] if runs else {"verdict": "not run"}
+        runs = sorted(self.runs.values(), key=lambda run: run.get("growth", math.inf))
+        return first_of(runs, *DECIDED, COARSELY, "cannot tell", ZERO, "refused") or {
+            "verdict": "not run"}
 
     def next(self, most_seconds):
-        """(predicted seconds, parameter, samples per pixel), or None where nothing is left."""
-        if self.result()["verdict"] in ("disagree", "agree", "not complete"):
+        """(order, parameter, seconds) of a forward run, or None where nothing is left."""
+        if first_of(self.runs.values(), *DECIDED):
             return None
-        steps = []
-        for parameter, run in self.runs.items():
-            if run["verdict"] not in ("cannot tell", COARSELY):
-                continue
-            per_sample = run.get("per_sample", run["seconds"] / run["spp"])
-            for needed in (run["needed"], run.get("coarse", math.inf)):
-                wanted = max(2 * run["spp"], 1.2 * needed)
-                if needed <= run["spp"] or not math.isfinite(needed):
-                    continue
-                if wanted * per_sample <= most_seconds * (4 if run["spp"] == FIRST_SPP else 1):
-                    spp = int(min(wanted, MOST_GROWTH * run["spp"]))
-                    steps.append((spp * per_sample, parameter, spp))
+        open_runs = [(p, r) for p, r in self.runs.items()
+                     if r["verdict"] in (COARSELY, "cannot tell")]
+        for parameter, run in open_runs:
+            seconds = min(GROWTH * run["seconds"], most_seconds)
+            if seconds > run["seconds"] and math.isfinite(run["growth"]):
+                return run["growth"] * run["seconds"], parameter, seconds
         untried = [name for name, _ in self.candidates if name not in self.runs]
-        if not steps and untried:
-            steps = [(self.rank + len(self.runs), untried[0], FIRST_SPP)]
-        return min(steps) if steps else None
+        if open_runs or not untried:
+            return None
+        return self.rank - 1e6, untried[0], min(FIRST_SECONDS, most_seconds)
 
 
 class Scene:
@@ -215,27 +211,50 @@ class Scene:
         return not SMOOTH.search(bsdfs)
 
 
-def run_check(limn, folder, check, parameter, spp):
-    scene = check.scene
-    size = dict(check.candidates)[parameter]
-    wrt = parameter
-    if check.mode == FORWARD:
-        wrt = direction_of(folder, parameter, size, scene.description)
-    file = os.path.join(folder, "check.json")
+def run_check(arguments, scene, options):
+    """The reports of `limn check`, or None; and its message."""
+    file = os.path.join(arguments.output, "check.json")
     if os.path.exists(file):
         os.remove(file)
-    command = [limn, "check", scene.file, "--wrt", wrt, "--spp", str(spp), "--threads", "1",
-               "--quiet", "--json", file, *scene.options]
-    done, seconds = timed(command + ["--reverse"] * (check.mode == REVERSE))
-    report = common.read_json(file)
-    if not report:
-        errors = [line for line in done.stderr.splitlines() if "warning:" not in line]
-        result = {"verdict": "refused", "message": "\n".join(errors)[:300]}
-    elif check.mode == FORWARD:
-        result = forward_result(report[0])
-    else:
-        result = reverse_result(report[0], spp)
-    return {"wrt": wrt, "spp": spp, "seconds": seconds, **result}
+    command = [arguments.limn, "check", scene.file, "--threads", "1", "--quiet", "--json", file,
+               *scene.options, *options]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    errors = [line for line in done.stderr.splitlines() if "warning:" not in line]
+    return common.read_json(file), "\n".join(errors)[:300] or f"exit status {done.returncode}"
+
+
+def run_forward(arguments, check, parameter, seconds):
+    scene = check.scene
+    wrt = direction_of(arguments.output, parameter, dict(check.candidates)[parameter],
+                       scene.description)
+    reports, message = run_check(arguments, scene, ["--wrt", wrt, "--time", str(seconds)])
+    result = forward_result(reports[0]) if reports else {"verdict": "refused", "message": message}
+    check.runs[parameter] = {"wrt": wrt, "seconds": seconds, **result}
+
+
+def run_reverse(arguments, scene, checks, spp=REVERSE_SPP):
+    """The first parameters of the checks in one run, and once more with samples for --seconds of
+    processor time; or each in its own, where one is refused."""
+    names = [check.candidates[0][0] for check in checks]
+    options = [option for name in names for option in ("--wrt", name)]
+    before = os.times()
+    reports, message = run_check(arguments, scene, ["--reverse", "--spp", str(spp), *options])
+    seconds = os.times().children_user - before.children_user
+    if not reports and len(checks) > 1:
+        for check in checks:
+            run_reverse(arguments, scene, [check])
+        return
+    for check, name in zip(checks, names):
+        # A colour has a report for each channel.
+        runs = [reverse_result(report) for report in reports or []
+                if report["parameter"] in (name, *(f"{name}.{c}" for c in "rgb"))]
+        result = first_of(runs, "disagree", "cannot tell", "agree", ZERO)
+        check.runs[name] = {"wrt": name, "spp": spp,
+                            **(result or {"verdict": "refused", "message": message})}
+    more = int(spp * arguments.seconds / seconds)
+    unclear = [check for check in checks if check.result()["verdict"] == "cannot tell"]
+    if unclear and spp == REVERSE_SPP and more > spp:
+        run_reverse(arguments, scene, unclear, more)
 
 
 def checks_of(scenes, results):
@@ -246,35 +265,45 @@ def checks_of(scenes, results):
     before = collections.Counter()
     for check in checks:
         before[check.kind, check.mode] += 1
-        check.rank = 0.1 * before[check.kind, check.mode]
+        check.rank = before[check.kind, check.mode]
     return checks
 
 
 def work_off(arguments, checks, results):
-    """Runs the cheapest step of all, until none is left or the time is over."""
+    """Reverse runs, then the forward run that comes first, until the time is over."""
     end = time.monotonic() + 60 * arguments.minutes
-    steps = {i: check.next(arguments.seconds) for i, check in enumerate(checks)}
+
+    def keep(done):
+        common.write_json(os.path.join(arguments.output, "results.json"), results)
+        for check in done:
+            run = list(check.runs.values())[-1]
+            print(f"{check.scene.name:58} {check.mode} {run['wrt']}: {run['verdict']}", flush=True)
+
+    reverse = collections.defaultdict(list)
+    for check in checks:
+        if check.mode == REVERSE and not check.runs:
+            reverse[check.scene].append(check)
+    for scene, some in reverse.items():
+        if time.monotonic() < end:
+            run_reverse(arguments, scene, some)
+            keep(some)
+    forward = [check for check in checks if check.mode == FORWARD]
+    steps = {i: check.next(arguments.seconds) for i, check in enumerate(forward)}
     steps = {i: step for i, step in steps.items() if step}
     while steps and time.monotonic() < end:
         i = min(steps, key=lambda i: steps[i][0])
-        check, (_, parameter, spp) = checks[i], steps.pop(i)
-        result = run_check(arguments.limn, arguments.output, check, parameter, spp)
-        last = check.runs.get(parameter)
-        if last and last["spp"] < spp:  # without what pilots and files take
-            slope = (result["seconds"] - last["seconds"]) / (spp - last["spp"])
-            result["per_sample"] = max(slope, 0.2 * result["seconds"] / spp)
-        check.runs[parameter] = result
-        common.write_json(os.path.join(arguments.output, "results.json"), results)
-        print(f"{check.scene.name:58} {check.mode} {parameter} {spp}: {result['verdict']}",
-              flush=True)
-        step = check.next(arguments.seconds)
+        _, parameter, seconds = steps.pop(i)
+        run_forward(arguments, forward[i], parameter, seconds)
+        keep([forward[i]])
+        step = forward[i].next(arguments.seconds)
         if step:
             steps[i] = step
     return len(steps)
 
 
 def print_table(checks):
-    verdicts = ("agree", COARSELY, "cannot tell", "not complete", "refused", "not run", "disagree")
+    verdicts = ("agree", COARSELY, ZERO, "cannot tell", "not complete", "refused", "not run",
+                "disagree")
     table = collections.defaultdict(collections.Counter)
     for check in checks:
         for row in (check.kind, "all " + check.mode):
@@ -295,9 +324,9 @@ def main():
                         default=os.path.join(common.ROOT, "out", "derivatives"))
     parser.add_argument("--only", default="", metavar="TEXT",
                         help="scenes whose path contains this")
-    parser.add_argument("--film", type=int, default=16, metavar="N", help="pixels of a side")
-    parser.add_argument("--seconds", type=common.positive, default=20, metavar="N",
-                        help="of one check (processor time)")
+    parser.add_argument("--film", type=int, default=8, metavar="N", help="pixels of a side")
+    parser.add_argument("--seconds", type=common.positive, default=12, metavar="N",
+                        help="of one forward check, at most")
     parser.add_argument("--minutes", type=common.positive, default=60, metavar="N",
                         help="of this call")
     arguments = census.read_arguments(parser)
@@ -323,9 +352,9 @@ def main():
     print_table(checks)
     counts = collections.Counter(check.result()["verdict"] for check in checks)
     told = [s.name for s in scenes
-            if {c.result()["verdict"] for c in checks if c.scene is s} == {"agree"}]
+            if {c.result()["verdict"] for c in checks if c.scene is s} <= {"agree", ZERO}]
     print(f"{counts['agree']} of {len(checks)} checks agree, {counts[COARSELY]} more coarsely, "
-          f"{counts['disagree']} disagree, in "
+          f"{counts[ZERO]} are zero, {counts['disagree']} disagree, in "
           f"{len(scenes)} scenes ({smooth} more have smooth lobes); in {len(told)} all agree; "
           f"{left} checks can go on")
     return 1 if counts["disagree"] or counts["agree"] < arguments.at_least else 0
