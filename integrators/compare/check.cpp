@@ -511,7 +511,15 @@ CheckResult check(const Scene& scene, const CheckOptions& options, const RunSett
   if (options.exact_film) check_exact_film(scene, method);
   check_warp(options.warp, {method});
   check_blur(options.blur, {method});
-  return Checker(scene, options, settings, run).check();
+  const Parameter parameter = find_parameter(scene, options.parameter);
+  const double step = std::max(options.step, parameter.natural_step);
+  const std::optional<Scene> inside = with_texels_inside(scene, parameter, step);
+  CheckResult result = Checker(inside ? *inside : scene, options, settings, run).check();
+  if (inside) {
+    result.gradient.warnings.push_back(options.parameter +
+                                       ": texels at the ends of their range are checked inside it");
+  }
+  return result;
 }
 
 const char* verdict_name(Verdict verdict) {

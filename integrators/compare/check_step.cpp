@@ -214,6 +214,28 @@ double find_check_step(const Scene& scene, const std::string& parameter, const W
   return power_of_two_below(std::min(std::max(step, 2 * least), most));
 }
 
+std::optional<Scene> with_texels_inside(const Scene& scene, const Parameter& parameter,
+                                        double step) {
+  const Image velocities = parameter.texel_velocities(scene);
+  if (velocities.data.empty()) return std::nullopt;
+  const TexelMap& map = *parameter.texel_map(scene);
+  const TexelMap::Map range = map.map();
+  Image texels = map.texels();
+  bool any = false;
+  for (size_t i = 0; i < velocities.data.size(); ++i) {
+    const double reach = 2 * step * std::fabs(double{velocities.data[i]});
+    if (reach == 0 || 2 * reach > range.most - range.least) continue;
+    const double inside =
+        std::clamp(double{texels.data[i]}, range.least + reach, range.most - reach);
+    any = any || inside != texels.data[i];
+    texels.data[i] = static_cast<float>(inside);
+  }
+  if (!any) return std::nullopt;
+  Scene copy = parameter.moved(scene, 0);
+  parameter.texel_map(copy)->set_texels(texels);
+  return copy;
+}
+
 double rounding_of_moves(const Scene& scene, const Parameter& parameter, double step) {
   return kRounding * least_step(scene, parameter) / step;
 }

@@ -22,6 +22,11 @@ double find_check_step(const Scene& scene, const std::string& parameter, const W
 // small enough, else a smaller one.
 double reduced_step(const DifferenceResult& differences, double step, const Windows& windows);
 
+// A copy of the scene in which the texels that a parameter moves keep to their range over twice a
+// step; none if they do so in the scene. Beyond its range, a texel of an opacity changes nothing.
+std::optional<Scene> with_texels_inside(const Scene& scene, const Parameter& parameter,
+                                        double step);
+
 // The error that rounding moved positions and texels to float causes in differences at a step,
 // over the derivative: about 2^-24 of what moves over its way. 0 if none of these moves.
 double rounding_of_moves(const Scene& scene, const Parameter& parameter, double step);

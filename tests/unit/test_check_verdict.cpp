@@ -10,6 +10,7 @@
 #include "integrators/compare/edge_events.h"
 #include "integrators/methods/hair_gaps.h"
 #include "limn/core/field_error.h"
+#include "limn/core/image.h"
 #include "limn/core/rng.h"
 #include "limn/integrators/backward.h"
 #include "limn/integrators/run.h"
@@ -253,6 +254,36 @@ TEST(CheckSamples, AreOfLeastError) {
   ASSERT_TRUE(enough);
   EXPECT_LT(static_cast<double>(enough->gradient), 1500);
   EXPECT_FALSE(more_samples(gradient, differences, 0.5, 5));
+}
+
+// Beyond 0 and 1 an opacity changes nothing, so that differences there hold half of the slope.
+TEST(CheckVerdict, TexelsAtTheEndsOfTheirRangeAreCheckedInside) {
+  const TempFiles files;
+  Image holes(8, 8, 3);
+  for (size_t i = 0; i < holes.data.size(); ++i) holes.data[i] = i / 3 % 8 < 4 ? 1 : 0;
+  write_exr(files.path("holes.exr"), holes, false, {});
+  SceneParts parts;
+  parts.width = parts.height = 4;
+  parts.max_depth = 2;
+  parts.body =
+      square("screen", 3, 0, {0, 0.5, 0},
+             R"(<bsdf type="mask" id="holes"><texture type="bitmap" name="opacity"><string
+                         name="filename" value=")" +
+                 files.path("holes.exr") + R"("/></texture><bsdf type="diffuse"/></bsdf>)") +
+      constant_light("sky", "1, 1, 1");
+  Image ones(8, 8, 3);
+  std::fill(ones.data.begin(), ones.data.end(), 1.0f);
+  write_exr(files.path("ones.exr"), ones, false, {});
+  CheckOptions options;
+  options.parameter = "holes.opacity.data:" + files.path("ones.exr");
+  options.step = 0.1;
+  RunSettings settings;
+  settings.spp = 4096;
+  const Scene scene = make_scene(files, parts);
+  const CheckResult r = check(scene, options, settings);
+  EXPECT_EQ(r.verdict, Verdict::kAgree) << r.total.gradient << " " << r.total.difference;
+  EXPECT_EQ(r.gradient.warnings.back(),
+            options.parameter + ": texels at the ends of their range are checked inside it");
 }
 
 // What looks like no noise in a few samples is looked at for an eighth of the time.

@@ -22,9 +22,7 @@ A reverse check agrees if an error as large as the derivative would show.
 
 Results are kept in FOLDER/results.json (out/derivatives) and a later call goes on from there; after
 a change of limn, remove it. The exit status is 1 where a check disagrees, or fewer than --at-least
-agree. A disagreement in mitsuba-data: the opacity of a textured mask. Most texels are 0 or 1,
-the ends of their range, beyond which nothing changes, so that central differences hold half of the
-slope. With texels inside they agree.
+agree.
 """
 
 import argparse
