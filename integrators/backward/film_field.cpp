@@ -80,7 +80,8 @@ double FilmField::look(const PathContext& context, size_t pixel, std::vector<Sig
   const Film& film = scene_.film;
   const CameraView<double> camera(scene_.camera);
   const auto column = static_cast<int>(pixel % width_), row = static_cast<int>(pixel / width_);
-  Rng rng = Rng(0, pixel, 0).at(Purpose::kFilm, 0);
+  constexpr uint64_t kStream = 0xf1e1d;  // any number: V must not depend on a run's samples
+  Rng rng = Rng(mix_bits(kStream), pixel, 0).at(Purpose::kFilm, 0);
   std::array<Met, kRays> met;
   int pairs = 0;
   for (int i = 0; i < kRays; ++i) {

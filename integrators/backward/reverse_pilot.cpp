@@ -310,17 +310,21 @@ class Pilot {
 
 }  // namespace
 
+BackwardOptions without_pilot(const BackwardOptions& options) {
+  if (!options.method->reverse->chooses) return options;
+  return with_method(options, asks_for_regions(options) ? "silhouettes" : "forest");
+}
+
 ReversePlan planned(const Scene& scene, const Image& adjoint, const BackwardOptions& options,
                     const RunSettings& settings, const Stopwatch& watch) {
   const auto plain = [&](const BackwardOptions& own) {
     return ReversePlan{std::make_unique<ReverseEstimator>(scene, adjoint, own, settings.threads),
                        ""};
   };
-  if (!options.method->reverse->chooses) return plain(options);
-  if (asks_for_regions(options)) return plain(with_method(options, "silhouettes"));
-  const bool free = options.terms.empty() && leaves_numbers(options) && !options.uniform_pixels &&
+  const bool free = options.method->reverse->chooses && options.terms.empty() &&
+                    leaves_numbers(options) && !options.uniform_pixels &&
                     !needs_times(scene, reverse_parameters(scene, options));
-  if (!free) return plain(with_method(options, "forest"));
+  if (!free) return plain(without_pilot(options));
   return Pilot(scene, adjoint, options, settings, watch).plan();
 }
 

@@ -17,6 +17,9 @@ struct ReversePlan {
   std::string decision;  // for people to read; empty if there was nothing to decide
 };
 
+// With the method that stands in for `adaptive` where there is no pilot; other methods stay.
+BackwardOptions without_pilot(const BackwardOptions& options);
+
 // options: of the method `adaptive` or another; then, and where samples, terms or uniform pixels
 // are asked for, in runs too short for a pilot and where the scene has times, there is no pilot:
 // `adaptive` is `forest` then, or `silhouettes` if one of its own terms is asked for. Pilots take

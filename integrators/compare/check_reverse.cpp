@@ -4,6 +4,7 @@
 #include <numeric>
 
 #include "integrators/backward/parameter_slots.h"
+#include "integrators/backward/reverse_pilot.h"
 #include "integrators/estimates/batches.h"
 #include "integrators/pilot/term_estimator.h"
 #include "limn/core/error.h"
@@ -215,7 +216,9 @@ std::vector<ReverseCheck> check_reverse(const Scene& scene, const BackwardOption
   const auto reverse = reverse_sums(scene, list, options, adjoint, settings);
   RunSettings other = settings;
   other.seed = mix_bits(mix_bits(settings.seed) + 3);
-  const auto [sums, light] = forward_sums(scene, parameters, options, adjoint, other);
+  // Single terms are those of one method.
+  const BackwardOptions own = options.terms.empty() ? options : without_pilot(options);
+  const auto [sums, light] = forward_sums(scene, parameters, own, adjoint, other);
   if (settings.interrupted && settings.interrupted->load()) return {};
   std::vector<ReverseCheck> checks;
   for (size_t i = 0; i < list.size(); ++i) {

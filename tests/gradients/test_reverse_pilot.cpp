@@ -65,6 +65,27 @@ TEST(ReversePilot, ChoosesAlikeOnAnyNumberOfThreads) {
   EXPECT_EQ(means(one), means(three));
 }
 
+// `boundary` of `forest` has what `silhouettes` leaves to `direct`: a check compares one of both.
+TEST(ReversePilot, IsCheckedByTheTermsThatItTakes) {
+  const TempFiles files;
+  const Scene scene = shadowed(files);
+  BackwardOptions options;
+  options.parameters = {"body.translate.x", "body.translate.y"};
+  options.method = Method("adaptive");
+  options.terms = {"boundary"};
+  RunSettings settings;
+  settings.spp = 4;
+  settings.threads = 2;
+  const auto checks = check_reverse(scene, options, settings);
+  options.method = Method("forest");
+  const auto plain = check_reverse(scene, options, settings);
+  ASSERT_EQ(checks.size(), plain.size());
+  for (size_t i = 0; i < checks.size(); ++i) {
+    EXPECT_EQ(checks[i].forward, plain[i].forward);
+    EXPECT_EQ(checks[i].reverse, plain[i].reverse);
+  }
+}
+
 // Squared error x work, with rays for work, falls by more than pilots can be wrong by; the mean is
 // that of `silhouettes`, and error bars are true: six runs' chi-square of Hotelling's kind, each
 // parameter by itself, within what has a probability of 1e-4.
