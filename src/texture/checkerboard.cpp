@@ -28,11 +28,14 @@ class Checkerboard final : public Texture {
     return copy;
   }
 
-  Rgb<double> mean() const override { return (value(colors_[0]) + value(colors_[1])) * 0.5; }
+  Rgb<double> mean() const override {
+    const Rgb<double> sum = value(colors_[0]) + value(colors_[1]);
+    return (of_numbers_ ? grey(sum.r) : sum) * 0.5;
+  }
   Range range() const override {
     Range range{colors_[0].r.v, colors_[0].r.v};
     for (const Rgb<Dual>& color : colors_) {
-      for (int c = 0; c < 3; ++c) {
+      for (int c = 0; c < (of_numbers_ ? 1 : 3); ++c) {
         range.least = std::min(range.least, color[c].v);
         range.most = std::max(range.most, color[c].v);
       }
@@ -48,7 +51,9 @@ class Checkerboard final : public Texture {
     const auto ref = [this](const char* name, Rgb<Dual>& c) {
       // Colours above 1 are those of a lamp.
       const double most = range().most > 1 ? std::numeric_limits<float>::max() : 1;
-      return ParameterRef{name, {&c.r, &c.g, &c.b}, ParameterRef::Unit::kValue, 0, most};
+      std::vector<Dual*> values{&c.r};
+      if (!of_numbers_) values.insert(values.end(), {&c.g, &c.b});
+      return ParameterRef{name, std::move(values), ParameterRef::Unit::kValue, 0, most};
     };
     // For numbers, the colours' places are exchanged.
     return {ref("color0", colors_[of_numbers_ ? 1 : 0]),
@@ -67,10 +72,11 @@ class Checkerboard final : public Texture {
   Rgb<S> lookup(const TexturePoint<S>& point) const {
     const std::array<double, 2> uv = to_uv_(std::array{value(point.uv[0]), value(point.uv[1])});
     const auto second_half = [](double t) { return t - std::floor(t) > 0.5; };
-    return as<S>(colors_[second_half(uv[0]) == second_half(uv[1]) ? 0 : 1]);
+    const Rgb<Dual>& color = colors_[second_half(uv[0]) == second_half(uv[1]) ? 0 : 1];
+    return as<S>(of_numbers_ ? grey(color.r) : color);
   }
 
-  Rgb<Dual> colors_[2];
+  Rgb<Dual> colors_[2];  // of numbers, r alone
   UvTransform to_uv_;
 };
 

@@ -112,6 +112,25 @@ Scene lamps_scene(const TempFiles& files) {
   return make_scene(files, parts);
 }
 
+// Checkerboards in places of a colour and of two numbers.
+Scene checkered_scene(const TempFiles& files) {
+  SceneParts parts;
+  parts.max_depth = 3;
+  parts.origin = {0, 2.5, 4};
+  parts.body = square("floor", 3, -90, {0, 0, 0},
+                      R"(<bsdf type="principled" id="paint">
+                           <texture type="checkerboard" name="base_color">
+                             <rgb name="color0" value=".8, .5, .3"/></texture>
+                           <texture type="checkerboard" name="roughness">
+                             <rgb name="color0" value=".3, .5, .4"/>
+                             <float name="color1" value=".7"/></texture>
+                           <texture type="checkerboard" name="metallic">
+                             <float name="color0" value=".9"/></texture></bsdf>)") +
+               square("lamp", 0.8, 90, {0.5, 3.5, 1}, area_light("glow", "6, 5, 4")) +
+               constant_light("sky", ".3, .3, .3");
+  return make_scene(files, parts);
+}
+
 Image random_adjoint(const Scene& scene, uint64_t seed) {
   Image adjoint(scene.film.crop_width, scene.film.crop_height, 3);
   for (size_t i = 0; i < adjoint.data.size(); ++i) {
@@ -250,6 +269,7 @@ TEST(Backward, InteriorIsThatOfForwardMode) {
   expect_same_interior(shadow_scene(files, true));
   expect_same_interior(crossing_scene(files));
   expect_same_interior(lamps_scene(files), "analytic");
+  expect_same_interior(checkered_scene(files));
 }
 
 // Faces that go through each other and are cut by a clip plane among them.
