@@ -45,6 +45,14 @@ bool StraightWay::pass(const PathContext& context, FaceRef face, const Vec3d& om
   return true;
 }
 
+void StraightWay::go_on(Ray& ray) const {
+  // Rounding may put a face beyond the end.
+  ray.t_max = std::max(0.0, ray.t_max - length(from - ray.origin));
+  ray.origin = from;
+  ray.start = start;
+  ray.t_min = 0;
+}
+
 std::optional<Rgb<double>> share_along(const PathContext& context, Ray ray, int bounces,
                                        RayCount& rays) {
   if (!context.straight_ways) {
@@ -56,10 +64,7 @@ std::optional<Rgb<double>> share_along(const PathContext& context, Ray ray, int 
   Hit hit;
   while (++rays.closest, context.tracer.closest(ray, hit)) {
     if (!way.pass(context, hit.face, ray.direction)) return std::nullopt;
-    ray.t_max -= length(way.from - ray.origin);
-    ray.origin = way.from;
-    ray.start = way.start;
-    ray.t_min = 0;
+    way.go_on(ray);
     ray.skip_emitters = false;
   }
   if (context.scene.max_depth >= 0 && way.bounces + 1 >= context.scene.max_depth)

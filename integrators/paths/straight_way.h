@@ -24,6 +24,8 @@ struct StraightWay {
   // Goes on through a face that the ray from there along the unit direction omega meets; false if
   // nothing passes it, or the path is too long.
   bool pass(const PathContext& context, FaceRef face, const Vec3d& omega);
+  // Shortens the ray to what lies beyond the faces passed.
+  void go_on(Ray& ray) const;
 };
 
 // What the viewer at the ray's origin gets of the light that is scattered where it ends; none if

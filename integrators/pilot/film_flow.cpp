@@ -48,9 +48,19 @@ class FlowRays {
       : context_(estimator.context()),
         scene_(estimator.scene()),
         view_(scene_.camera),
-        moving_(scene_.camera) {}
+        moving_(scene_.camera),
+        far_(1e6 * std::max(bounds_of(scene_).diagonal(), length(value(scene_.camera.origin)))) {}
 
+  // A ray that cannot be traced is left out; the samples count it.
   void add(double x, double y, Seen& seen) const {
+    try {
+      trace(x, y, seen);
+    } catch (const UntraceableRay&) {
+    }
+  }
+
+ private:
+  void trace(double x, double y, Seen& seen) const {
     Ray ray = camera_ray(scene_, view_.ray(x, y));
     StraightWay way{ray.origin, ray.start};
     Hit hit;
@@ -64,17 +74,13 @@ class FlowRays {
         seen.add(motion_of(moving_with(mesh, hit.face.face, p)), share, scene_.camera.depth(p));
       }
       if (!passes) return;
-      ray.t_max -= length(way.from - ray.origin);
-      ray.origin = way.from;
-      ray.start = way.start;
-      ray.t_min = 0;
+      way.go_on(ray);
     }
-    constexpr double kFar = 1e6;
-    const Vec3d far = ray.origin + ray.direction * kFar;
-    seen.add(motion_of({far.x, far.y, far.z}), mean_of(way.share), kFar);
+    const Vec3d far = ray.origin + ray.direction * far_;
+    seen.add(motion_of({far.x, far.y, far.z}), mean_of(way.share),
+             std::numeric_limits<double>::max());
   }
 
- private:
   FilmMotion motion_of(const Vec3<Dual>& p) const {
     const auto at = moving_.project(p);
     return {at.x.d, at.y.d};
@@ -84,6 +90,7 @@ class FlowRays {
   const Scene& scene_;
   CameraView<double> view_;
   CameraView<Dual> moving_;
+  double far_;  // so far away, motions of the camera's place are not seen
 };
 
 }  // namespace
@@ -111,7 +118,8 @@ FilmFlows film_flows(const TermEstimator& estimator, const PlanGrid& grid, int t
 
 bool moves_textures(const Scene& scene) {
   return std::ranges::any_of(scene.shapes, [](const Shape& shape) {
-    return !shape.mesh.position_tangents.empty() && shape.bsdf->texture_count() > 0;
+    return !shape.mesh.position_tangents.empty() &&
+           (shape.bsdf->texture_count() > 0 || shape.radiance_texture);
   });
 }
 

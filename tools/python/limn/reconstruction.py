@@ -267,7 +267,7 @@ def reconstruct(
     positions, corners = visual_hull(used, _cells(used))
     model = Model(positions, corners, np.full((len(positions), 3), 0.5))
     history: list[Progress] = []
-    count = [None] * len(_STAGES) if steps is None else list(steps)
+    count: list[int | None] = [None] * len(_STAGES) if steps is None else list(steps)
     if len(count) != len(_STAGES):
         raise InputError(f"steps: {len(count)} numbers for {len(_STAGES)} stages")
     request = _Request(minutes, refine_cameras, count, seed, threads, tell)
