@@ -7,10 +7,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <memory>
 #include <span>
+#include <utility>
 
 #include "integrators/estimates/batches.h"
 #include "integrators/fit/fit_impl.h"
@@ -45,6 +45,12 @@ void Fit::Impl::check_blur() const {
     if (first.gamma == 0 && options_.sigma_end == 0) return;
     throw InputError("gamma and sigma_end are for fits that begin blurred: give sigma, too");
   }
+  if (options_.sigma_end > first.sigma) {
+    throw InputError("sigma_end must be at most sigma: faces get sharper from step to step");
+  }
+  if (!options_.backward.terms.empty()) {
+    throw InputError("a fit that begins blurred takes all terms: leave out `terms`");
+  }
   if (is_exact() || over_faces()) {
     throw InputError("fits that begin blurred need random points and another optimiser than lbfgs");
   }
@@ -74,13 +80,18 @@ Blur Fit::Impl::blur() const {
 
 bool Fit::Impl::add_blurred(size_t view, const Image& adjoint, const RunSettings& settings,
                             std::vector<std::vector<double>>& gradients) const {
-  std::vector<Parameter> list;
-  std::vector<size_t> of;  // their numbers among all parameters
+  std::vector<Parameter> list;                // channels of colours one by one
+  std::vector<std::pair<size_t, size_t>> of;  // which parameter of the fit, which of its numbers
   for (size_t i = 0; i < parameters_.size(); ++i) {
-    if (!parameters_[i].in_view(view)) continue;
-    list.push_back(*parameters_[i].in_view(view));
-    of.push_back(i);
-    gradients[i].resize(list.back().numbers());
+    const Parameter* const found = parameters_[i].in_view(view);
+    if (!found) continue;
+    gradients[i].resize(found->numbers());
+    for (size_t c = 0; c < found->numbers(); ++c) {
+      list.push_back(found->colour ? find_parameter(views[view].scene,
+                                                    fmt::format("{}.{}", found->name, "rgb"[c]))
+                                   : *found);
+      of.emplace_back(i, c);
+    }
   }
   if (list.empty()) return true;
   const Scene scene = flat(views[view].scene);
@@ -92,12 +103,12 @@ bool Fit::Impl::add_blurred(size_t view, const Image& adjoint, const RunSettings
   }
   int64_t spp = 0;
   NonFinite non_finite;
-  std::vector<std::array<double, 3>> sums(list.size());  // of the image's channels
+  std::vector<double> sums(list.size());
   run_batches(passes, settings, Stopwatch(), [&](const Batch& batch, const auto& done) {
     for (size_t k = 0; k < list.size(); ++k) {
       const std::vector<double>& image = done[k / kLanes].images[k % kLanes];
       for (size_t j = 0; j < image.size(); ++j) {
-        sums[k][j % 3] += image[j] * static_cast<double>(adjoint.data[j]);
+        sums[k] += image[j] * static_cast<double>(adjoint.data[j]);
       }
     }
     for (const BatchSums& pass : done) non_finite.merge(pass.non_finite);
@@ -105,10 +116,8 @@ bool Fit::Impl::add_blurred(size_t view, const Image& adjoint, const RunSettings
   });
   if (non_finite.count > 0) throw InputError("gradient: " + non_finite.message());
   if (spp < settings.spp) return false;
-  // A channel of a colour is seen in that channel of the image alone.
   for (size_t k = 0; k < list.size(); ++k) {
-    std::vector<double>& g = gradients[of[k]];
-    for (size_t c = 0; c < 3; ++c) g[c % g.size()] += sums[k][c] / static_cast<double>(spp);
+    gradients[of[k].first][of[k].second] += sums[k] / static_cast<double>(spp);
   }
   return true;
 }

@@ -26,8 +26,7 @@ void check_blurred(const Scene& scene) {
   check_still(scene, "the method \"blurred\"");
   for (const Shape& shape : scene.shapes) {
     const auto refuse = [&](const std::string& what) {
-      throw InputError(shape.where,
-                       "the methods blurred and blurred-published do not know " + what);
+      throw InputError(shape.where, "blurred faces do not support " + what);
     };
     if (!is_flat(shape.mesh)) refuse("interpolated normals: set face_normals");
     if (shape.mesh.textured) refuse("textures");

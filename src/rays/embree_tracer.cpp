@@ -372,10 +372,10 @@ class EmbreeBlurTracer final : public BlurTracer {
       collect(cut, false, hits);
     }
     if (hits.size() > kMostBlurHits) {
-      throw InputError("a ray meets " + std::to_string(hits.size()) + " blurred faces: sigma " +
-                       std::to_string(faces_.blur().sigma) +
-                       " is too large for sides whose median is " +
-                       std::to_string(median_side(faces_.scene())));
+      throw InputError(
+          "a ray meets " + std::to_string(hits.size()) + " blurred faces: sigma " +
+          std::to_string(faces_.blur().sigma) + " is too large for sides whose median is " +
+          std::to_string(median_side(faces_.scene())) + ": take a smaller sigma or a coarser mesh");
     }
     faces_.settle(ray, hits);
   }

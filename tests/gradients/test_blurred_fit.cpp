@@ -122,6 +122,37 @@ TEST(BlurredFit, StepsAreSharpAdjointsTimesBlurredDerivatives) {
   }
 }
 
+// Where a channel of a colour acts on all channels of the image, its step is that of the channel as
+// a parameter of its own.
+TEST(BlurredFit, ChannelsOfColoursMayMix) {
+  const TempFiles files;
+  SceneParts parts;
+  parts.max_depth = 2;
+  parts.width = parts.height = 4;
+  parts.body =
+      square("floor", 3, -90, {0, 0, 0},
+             R"(<bsdf type="principled" id="paint"><rgb name="base_color" value=".7, .2, .1"/>
+                         <float name="spec_tint" value="1"/></bsdf>)") +
+      square("lamp", 0.3, 90, {0, 4, 0}, area_light("glow", "30"));
+  const Scene scene = make_scene(files, parts);
+  const Image target(4, 4, 3);
+  const std::string name = "paint.base_color";
+  const auto first_step = [&](const std::vector<std::string>& names) {
+    FitOptions options = options_of(names, 0.01, 1);
+    options.optimiser = OptimiserKind::kGradientDescent;
+    options.step = 0.1;
+    Fit fit({{scene, target, {}}}, options, settings_of(16, 3));
+    fit.step();
+    return find_parameter(scene, name).value(fit.views()[0].scene);
+  };
+  const std::vector<double> whole = first_step({name});
+  const std::vector<double> parted = first_step({name + ".r", name + ".g", name + ".b"});
+  for (size_t c = 0; c < 3; ++c) {
+    EXPECT_NE(whole[c], find_parameter(scene, name).value(scene)[c]);
+    EXPECT_NEAR(whole[c], parted[c], 1e-12);
+  }
+}
+
 // On any number of threads, and after a break in the blurred steps.
 TEST(BlurredFit, HasTheSameBits) {
   const TempFiles files;
@@ -196,6 +227,12 @@ TEST(BlurredFit, RefusesWhatItCannotTake) {
   options.optimiser = OptimiserKind::kLbfgs;
   options.backward.method = Method("analytic");
   tells(options, "another optimiser than lbfgs");
+  options = options_of(x, 0.1, 3);
+  options.sigma_end = 0.2;
+  tells(options, "sigma_end must be at most sigma");
+  options = options_of(x, 0.1, 3);
+  options.backward.terms = {"camera"};
+  tells(options, "leave out `terms`");
 }
 
 }  // namespace

@@ -64,7 +64,7 @@ class FitCommand final : public Command {
   std::vector<FitView> read_views(const FitArguments& arguments);
   void check_resume() const;
   FitFolder open_folder();
-  void warn_of_remeshing(const FitArguments& arguments);
+  void warn_of_steps(const FitArguments& arguments);
   int loop(Fit& fit, FitFolder& folder, const RunSettings& settings);
   void tell(const FitRecord& record) const;
 
@@ -228,11 +228,17 @@ void FitCommand::check_resume() const {
   throw InputError("--resume goes on with what its folder says: leave out " + limn::join(other));
 }
 
-void FitCommand::warn_of_remeshing(const FitArguments& arguments) {
+void FitCommand::warn_of_steps(const FitArguments& arguments) {
   for (const int64_t step : arguments.options.remesh) {
     if (step <= arguments.steps) continue;
     warnings_.add_all(
         {fmt::format("--remesh {}: the fit ends before, after {} steps", step, arguments.steps)});
+  }
+  const int blurred = arguments.options.blur_steps;
+  if (blurred > 0 && blurred >= arguments.steps) {
+    warnings_.add_all({fmt::format(
+        "--blur-steps {}: the fit ends after {} steps, before its first with exact derivatives",
+        blurred, arguments.steps)});
   }
 }
 
@@ -270,7 +276,7 @@ int FitCommand::run(const std::string&) {
   Fit fit(std::move(views), folder.arguments().all_options(), settings);
   running = &fit;
   warnings_.add_all(fit.warnings());
-  warn_of_remeshing(folder.arguments());
+  warn_of_steps(folder.arguments());
   if (!resume_.empty()) folder.restore(fit);
   started = fit.steps();
   const int status = loop(fit, folder, settings);
