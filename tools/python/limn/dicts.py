@@ -20,8 +20,9 @@ from .meshes import read_foreign, write_ply
 
 # The element that each type is written as: the types that the reader of files knows.
 TYPES = {
-    "integrator": ["aov", "direct", "direct_projective", "moment", "path", "prb", "prb_basic",
-                   "prb_projective", "ptracer", "volpath", "volpathmis"],
+    "integrator": ["aov", "direct", "direct_projective", "direct_reparam", "moment", "path", "prb",
+                   "prb_basic", "prb_projective", "prb_reparam", "prbvolpath", "ptracer", "volpath",
+                   "volpathmis"],
     "sensor": ["perspective", "batch", "orthographic", "thinlens"],
     "film": ["hdrfilm"],
     "rfilter": ["box", "gaussian", "tent"],
