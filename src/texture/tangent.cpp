@@ -127,7 +127,7 @@ class Tangent final : public Texture {
     return {{{ids[0], 1 - point.b[0] - point.b[1]}, {ids[1], point.b[0]}, {ids[2], point.b[1]}}};
   }
   std::vector<ParameterRef> parameters() override { return {}; }
-  std::shared_ptr<Texture> clone() const override { return std::make_shared<Tangent>(); }
+  std::shared_ptr<Texture> clone() const override { return std::make_shared<Tangent>(*this); }
   std::string describe() const override { return "tangent"; }
 
  private:

@@ -46,6 +46,41 @@ def test_reverse_dotted_with_a_motion_is_forward(scene, adjoint):
     compare("tent.translate.y", float(whole.value), float(whole.stderr))
 
 
+DULL = {"type": "roughconductor", "alpha": 0.3}
+BSDFS = {
+    "diffuse": {"type": "diffuse"},
+    "isotropic": DULL,
+    "anisotropic": {"type": "roughconductor", "alpha_u": 0.4, "alpha_v": 0.1},
+    "normal map": {"type": "normalmap", "bsdf": DULL,
+                   "normalmap": {"type": "bitmap", "raw": True, "data": np.random.default_rng(1)
+                                 .random((4, 4, 3)).astype(np.float32) * 0.3 + 0.4}},
+    "principled": {"type": "principled", "roughness": 0.4, "anisotropic": 0.8, "spec_tint": 0.5},
+}
+
+
+@pytest.mark.parametrize("bsdf", BSDFS)
+def test_both_modes_are_equal_along_the_same_paths(bsdf):
+    scene = limn.load_dict({
+        "type": "scene", "integrator": {"type": "path", "max_depth": 3},
+        "sensor": {"type": "perspective", "fov": 40,
+                   "to_world": limn.Transform().look_at([1, 1, 4], [0, 0, 0], [0, 1, 0]),
+                   "film": {"type": "hdrfilm", "width": 4, "height": 4, "rfilter": {"type": "box"}}},
+        "ball": {"type": "sphere", "bsdf": BSDFS[bsdf]},
+        "lamp": {"type": "point", "position": [2, 3, 4]},
+        "sky": {"type": "constant"}})
+    run = {"spp": 16, "seed": 3, "method": "forest", "terms": ["interior"]}
+    adjoint = np.random.default_rng(2).random((4, 4, 3), dtype=np.float32)
+    names = [n for n, p in scene.parameters.items() if p.shape == ()]
+    assert {"ball.translate.x", "ball.rotate.y", "sensor.fov"} < set(names)
+    forward = limn.gradient(scene, names, samples=[1], **run)
+    reverse = limn.backward(scene, adjoint, names, uniform_pixels=True, **run)
+    for name in names:
+        products = adjoint * forward[name].value.astype(float)
+        # What images keep of a number, of all that may have cancelled.
+        rounding = 2.0**-23 * np.abs(products).sum() + 1e-12
+        assert abs(float(reverse[name].value) - products.sum()) <= rounding, name
+
+
 def run_program(folder, *words):
     """The output's folder, and what is in its report. The scene may follow any option."""
     output = folder / "backward"
