@@ -101,6 +101,11 @@ def test_it_has_the_programs_bits(folder, scene, adjoint, threads):
             assert estimate.value.tolist() == row["value"]
             assert estimate.stderr.tolist() == row["stderr"]
     assert np.array_equal(np.load(output / f"{POSITIONS}.npy"), found[POSITIONS].value)
+    heights = "tent.displacement"
+    output, _ = run_program(folder, "--adjoint", str(folder / "adjoint.exr"), "--spp", "4",
+                            "--seed", "9", "--wrt", heights)
+    found = limn.backward(scene, adjoint, heights, spp=4, seed=9, threads=threads)
+    assert np.array_equal(np.load(output / f"{heights}.npy"), found[heights].value)
     # With a loss, and half of what can be asked for.
     target = np.asarray(limn.render(scene, spp=16, seed=4)) * np.float32(1.5)
     limn.write_exr(folder / "target.exr", target)

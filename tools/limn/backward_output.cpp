@@ -49,7 +49,7 @@ VertexGradient of_vertices(const Mesh& mesh, const ParameterAdjoint& p) {
 // Doubles in NumPy's format, version 1.0.
 std::string npy_text(const ParameterAdjoint& p) {
   const Moments& g = p.moments;
-  std::string header = fmt::format("{{'descr': '<f8', 'fortran_order': False, 'shape': ({}), }}",
+  std::string header = fmt::format("{{'descr': '<f8', 'fortran_order': False, 'shape': ({},), }}",
                                    fmt::join(p.shape, ", "));
   const size_t before = 10;  // magic, version, length
   header.append(63 - (before + header.size()) % 64, ' ');
