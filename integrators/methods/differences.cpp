@@ -99,7 +99,7 @@ CentralDifferences central_differences(const Scene& scene, const std::vector<Dif
       }
       return now;
     }
-    const auto choices = std::make_shared<const PathChoices>(*unmoved);
+    const auto choices = std::make_shared<PathChoices>(*unmoved);
     EstimatorsAtTime now{{unmoved, choices}};
     for (const Scene& one : moved) {
       const auto there = placed(one);

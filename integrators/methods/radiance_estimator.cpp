@@ -24,7 +24,7 @@ RadianceEstimator::RadianceEstimator(const Scene& scene, int threads,
                  ? SharedPlace::reach_of(scene_.film)
                  : 0) {}
 
-RadianceEstimator::RadianceEstimator(const Scene& moved, const PathChoices& choices, int threads,
+RadianceEstimator::RadianceEstimator(const Scene& moved, PathChoices& choices, int threads,
                                      Numbers numbers)
     : scene_(moved),
       traced_(scene_, choices, threads),

@@ -22,7 +22,7 @@ class RadianceEstimator final : public SharingEstimator {
                     Numbers numbers = Numbers::kIndependent);
 
   // The radiance of a scene that has moved, by the choices of the one that has not.
-  RadianceEstimator(const Scene& moved, const PathChoices& choices, int threads, Numbers numbers);
+  RadianceEstimator(const Scene& moved, PathChoices& choices, int threads, Numbers numbers);
 
   const Scene& scene() const override { return scene_; }
   size_t slots() const override { return 1; }

@@ -36,8 +36,19 @@ TracedScene::TracedScene(const Scene& scene, int threads, const Options& options
                flat_mirrors_.get(),
                options.edges && has_straight_ways(scene)} {}
 
-TracedScene::TracedScene(const Scene& moved, const PathChoices& choices, int threads)
-    : tracer_(make_embree_tracer(moved, threads)),
+std::shared_ptr<const CoincidentFaces> PathChoices::faces_of(const Scene& moved, int threads) {
+  const auto same = [](const Shape& a, const Shape& b) {
+    return a.mesh.positions == b.mesh.positions;
+  };
+  if (value(moved.camera.origin) != value(unmoved.camera.origin) ||
+      !std::ranges::equal(moved.shapes, unmoved.shapes, same))
+    return nullptr;
+  if (!faces_) faces_ = std::make_shared<CoincidentFaces>(unmoved, threads);
+  return faces_;
+}
+
+TracedScene::TracedScene(const Scene& moved, PathChoices& choices, int threads)
+    : tracer_(make_embree_tracer(moved, threads, choices.faces_of(moved, threads))),
       lights_(moved, &choices.lights),
       context_{moved,           *tracer_, lights_, nullptr, nullptr, choices.mirrored.get(),
                &choices.unmoved} {}

@@ -16,9 +16,15 @@ bool is_glossy(const Scene& scene);
 struct PathChoices {
   explicit PathChoices(const Scene& scene)
       : unmoved(scene), lights(scene), mirrored(MirroredLight::make(scene, lights)) {}
+  // The faces that overlap, found once for all scenes whose faces and camera are where the unmoved
+  // one's are; null for others. Not for use from several threads at once.
+  std::shared_ptr<const CoincidentFaces> faces_of(const Scene& moved, int threads);
   const Scene& unmoved;
   Lights lights;
   std::unique_ptr<MirroredLight> mirrored;
+
+ private:
+  std::shared_ptr<const CoincidentFaces> faces_;
 };
 
 class TracedScene {
@@ -35,7 +41,7 @@ class TracedScene {
   // scene: with its parameters seeded; it must outlive this.
   TracedScene(const Scene& scene, int threads, const Options& options);
   // A scene that has moved, traced by the choices of the one that has not (limn/core/lights.h).
-  TracedScene(const Scene& moved, const PathChoices& choices, int threads);
+  TracedScene(const Scene& moved, PathChoices& choices, int threads);
   TracedScene(const TracedScene&) = delete;
   TracedScene& operator=(const TracedScene&) = delete;
 
