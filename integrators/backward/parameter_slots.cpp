@@ -2,6 +2,7 @@
 #include "integrators/backward/parameter_slots.h"
 
 #include <algorithm>
+#include <set>
 #include <utility>
 
 #include "limn/core/check.h"
@@ -53,13 +54,14 @@ std::shared_ptr<Bsdf> object_of(const std::shared_ptr<Bsdf>& bsdf, const Bsdf* s
 // What scatters in a scene, each once: copies of the scene have them in the same order.
 std::vector<std::shared_ptr<Bsdf>> scatterers(const Scene& scene) {
   std::vector<std::shared_ptr<Bsdf>> list;
+  std::set<const Bsdf*> found;
   for (const Shape& shape : scene.shapes) {
     for (const bool front : {false, true}) {
       const Bsdf* side = shape.bsdf->side(front);
       if (!side) continue;
       auto object = object_of(shape.bsdf, side);
       CHECK(object != nullptr);
-      if (std::find(list.begin(), list.end(), object) == list.end()) list.push_back(object);
+      if (found.insert(object.get()).second) list.push_back(object);
     }
   }
   return list;
@@ -211,11 +213,14 @@ std::vector<Vec3d> ParameterSlots::velocities_now(const Scene& scene, const Para
 }
 
 void ParameterSlots::add_shapes(const Scene& scene) {
-  for (const Dependence& dependence : dependences_) {
-    if (dependence.shape.valid()) free_.shapes[dependence.shape.index()] = true;
+  gathers_.resize(scene.shapes.size());
+  for (size_t i = 0; i < dependences_.size(); ++i) {
+    const ShapeId shape = dependences_[i].shape;
+    if (!shape.valid()) continue;
+    free_.shapes[shape.index()] = true;
+    gathers_[shape.index()].parameters.push_back(i);
   }
   const Vec3<Lanes> axes{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
-  gathers_.resize(scene.shapes.size());
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
     if (!free_.shapes[s]) continue;
     Mesh& mesh = scene_.shapes[s].mesh;
@@ -238,13 +243,17 @@ std::vector<uint32_t> ParameterSlots::take_values(const Scene& scene) {
   // Meshes are no part of what is looked at.
   Scene hull = deep_copy(scene);
   for (Shape& shape : hull.shapes) shape.mesh = {};
-  std::vector<uint32_t> slot_of(Values::of(hull).size(), 0);
+  Scene copy = deep_copy(hull);
+  std::vector<Dual*> values = Values::of(copy);
+  std::vector<uint32_t> slot_of(values.size(), 0);
   for (size_t i = 0; i < parameters_.size(); ++i) {
     if (dependences_[i].shape.valid() || dependences_[i].texels) continue;
-    Scene copy = deep_copy(hull);
+    if (time_) {
+      copy = deep_copy(hull);
+      values = Values::of(copy);
+    }
     parameters_[i].seed(copy, 0);
     if (time_) set_time(copy, *time_);
-    const std::vector<Dual*> values = Values::of(copy);
     for (size_t k = 0; k < values.size(); ++k) {
       if (values[k]->d[0] == 0) continue;
       if (k < kCameraSlots) {
@@ -260,6 +269,7 @@ std::vector<uint32_t> ParameterSlots::take_values(const Scene& scene) {
       const size_t number = parameters_[i].colour ? dependences_[i].weights.size() % 3 : 0;
       dependences_[i].weights.push_back({slot_of[k], values[k]->d[0], number});
     }
+    for (Dual* v : values) v->d[0] = 0;  // some are in the list twice
   }
   free_.camera = slots_.camera != 0;
   return slot_of;
@@ -352,9 +362,8 @@ void ParameterSlots::gather_shape(ShapeId shape, const std::vector<double>& sums
   if (const auto& back = gathers_[shape.index()].back) {
     for (Vec3d& d : of_vertices) d = back->vector(d);
   }
-  for (size_t i = 0; i < parameters_.size(); ++i) {
+  for (const size_t i : gathers_[shape.index()].parameters) {
     const Dependence& dependence = dependences_[i];
-    if (dependence.shape != shape) continue;
     for (size_t v = 0; v < dependence.directions.size(); ++v) {
       const uint32_t root = mesh.weld[v];
       values[i][v] = dot(of_vertices[root], dependence.directions[v]) / copies[root];

@@ -65,7 +65,8 @@ class ParameterSlots {
   };
   // What takes the slots of a shape to its vertices.
   struct ShapeGather {
-    std::vector<uint32_t> copies;  // of each vertex that is the first of its copies
+    std::vector<size_t> parameters;  // that move the shape
+    std::vector<uint32_t> copies;    // of each vertex that is the first of its copies
     std::optional<ShadingNormalsAdjoint> normals;
     // Takes derivatives with respect to vertices at the time to those at the reference time; none
     // without times.

@@ -520,6 +520,11 @@ TEST_F(Program, OutputsThatCollide) {
   EXPECT_NE(refused(gradient + " -o " + out() + " --json " + scene_)
                 .find("--json would write over a file that is read"),
             std::string::npos);
+  const std::string link = files_.path("link.json");  // another name of the file
+  std::filesystem::create_hard_link(scene_, link);
+  EXPECT_NE(refused(gradient + " -o " + out() + " --json " + link)
+                .find("--json would write over a file that is read"),
+            std::string::npos);
   EXPECT_NE(refused("check " + scene_ + " --wrt screen.translate.x --json " + files_.path("."))
                 .find("it is a folder"),
             std::string::npos);

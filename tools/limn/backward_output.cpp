@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <map>
+#include <optional>
 
 #include "limn/core/displacement.h"
 #include "limn/core/error.h"
@@ -80,9 +82,30 @@ Image to_map(const ParameterAdjoint& p, bool errors) {
   return map;
 }
 
+// What the middles of the film's pixels see: rays and hits, row by row.
+struct View {
+  explicit View(const Scene& scene) {
+    const auto tracer = make_embree_tracer(scene, 1);
+    const Film& film = scene.film;
+    const auto width = static_cast<size_t>(film.crop_width);
+    rays.resize(width * static_cast<size_t>(film.crop_height));
+    hits.resize(rays.size());
+    for (size_t i = 0; i < rays.size(); ++i) {
+      rays[i] = scene.camera.ray<double>(film.crop_x + static_cast<double>(i % width) + 0.5,
+                                         film.crop_y + static_cast<double>(i / width) + 0.5);
+      Hit hit;
+      const auto& ray = rays[i];
+      if (tracer->closest({ray.origin, ray.direction, ray.t_min, ray.t_max}, hit)) hits[i] = hit;
+    }
+  }
+
+  std::vector<CameraRay<double>> rays;
+  std::vector<std::optional<Hit>> hits;
+};
+
 // The shape as the camera sees it, each point in the colour of the gradient along the normal: that
 // of a vertex over the area around it, so that it says the same of any mesh.
-Image picture(const Scene& scene, ShapeId shape, const VertexGradient& g, const RayTracer& tracer) {
+Image picture(const Scene& scene, ShapeId shape, const VertexGradient& g, const View& view) {
   const Mesh& mesh = scene.shape(shape).mesh;
   std::vector<Vec3d> sum(mesh.positions.size()), normal(mesh.positions.size());
   std::vector<double> area(mesh.positions.size());
@@ -95,27 +118,22 @@ Image picture(const Scene& scene, ShapeId shape, const VertexGradient& g, const 
       area[mesh.weld[v]] += length(n);
     }
   }
-  const Film& film = scene.film;
-  Image image(film.crop_width, film.crop_height, 3);
-  for (int y = 0; y < film.crop_height; ++y) {
-    for (int x = 0; x < film.crop_width; ++x) {
-      const auto ray = scene.camera.ray<double>(film.crop_x + x + 0.5, film.crop_y + y + 0.5);
-      Hit hit;
-      if (!tracer.closest({ray.origin, ray.direction, ray.t_min, ray.t_max}, hit)) continue;
-      if (hit.face.shape != shape) continue;
-      const auto c = face_corners<double>(mesh, hit.face.face);
-      const Vec3d p = ray.origin + ray.direction * hit.t;
-      const Vec3d n = cross(c[1] - c[0], c[2] - c[0]);
-      double value = 0;
-      for (int k = 0; k < 3; ++k) {
-        const Vec3d &a = c[(k + 1) % 3], &b = c[(k + 2) % 3];
-        const double weight = dot(n, cross(a - p, b - p)) / dot(n, n);
-        const uint32_t v = mesh.weld[mesh.face(hit.face.face)[k]];
-        const double size = length(normal[v]);
-        if (size > 0) value += weight * dot(sum[v], normal[v]) / (size * area[v]);
-      }
-      for (int k = 0; k < 3; ++k) image.at(x, y, k) = static_cast<float>(value);
+  Image image(scene.film.crop_width, scene.film.crop_height, 3);
+  for (size_t i = 0; i < view.hits.size(); ++i) {
+    const std::optional<Hit>& hit = view.hits[i];
+    if (!hit || hit->face.shape != shape) continue;
+    const auto c = face_corners<double>(mesh, hit->face.face);
+    const Vec3d p = view.rays[i].origin + view.rays[i].direction * hit->t;
+    const Vec3d n = cross(c[1] - c[0], c[2] - c[0]);
+    double value = 0;
+    for (int k = 0; k < 3; ++k) {
+      const Vec3d &a = c[(k + 1) % 3], &b = c[(k + 2) % 3];
+      const double weight = dot(n, cross(a - p, b - p)) / dot(n, n);
+      const uint32_t v = mesh.weld[mesh.face(hit->face.face)[k]];
+      const double size = length(normal[v]);
+      if (size > 0) value += weight * dot(sum[v], normal[v]) / (size * area[v]);
     }
+    std::fill_n(image.data.begin() + static_cast<ptrdiff_t>(3 * i), 3, static_cast<float>(value));
   }
   return image;
 }
@@ -222,9 +240,9 @@ json describe_array(const ParameterAdjoint& p, const BackwardFiles::Array& array
 }
 
 json write_vertices(const Scene& scene, const ParameterAdjoint& p,
-                    const BackwardFiles::Array& array, const RayTracer& tracer, Table& table) {
+                    const BackwardFiles::Array& array, const View& view, Table& table) {
   const VertexGradient gradient = of_vertices(scene.shape(array.shape).mesh, p);
-  const Image image = picture(scene, array.shape, gradient, tracer);
+  const Image image = picture(scene, array.shape, gradient, view);
   const double scale = signed_scale(image);
   write_file(array.ply, ply_text(scene.shape(array.shape).mesh,
                                  {{"g", gradient.mean}, {"e", gradient.error}}));
@@ -254,19 +272,20 @@ json write_texels(const ParameterAdjoint& p, const BackwardFiles::Array& array, 
 
 json write_parameters(const Scene& scene, const BackwardFiles& files, const BackwardResult& result,
                       bool quiet) {
-  const auto tracer = make_embree_tracer(scene, 1);
+  const View view(scene);
+  std::map<std::string, const BackwardFiles::Array*> arrays;
+  for (const auto& array : files.arrays) arrays.emplace(array.parameter, &array);
   Table table(
       {{"parameter", true}, {"unit", true}, {"derivative"}, {"std. error"}, {"file", true}});
   json list = json::array();
   for (const ParameterAdjoint& p : result.parameters) {
-    const auto array = std::find_if(files.arrays.begin(), files.arrays.end(),
-                                    [&](const auto& a) { return a.parameter == p.name; });
-    if (array == files.arrays.end()) {
+    const auto at = arrays.find(p.name);
+    if (at == arrays.end()) {
       list.push_back(write_numbers(p, table));
-    } else if (array->shape.valid()) {
-      list.push_back(write_vertices(scene, p, *array, *tracer, table));
+    } else if (at->second->shape.valid()) {
+      list.push_back(write_vertices(scene, p, *at->second, view, table));
     } else {
-      list.push_back(write_texels(p, *array, table));
+      list.push_back(write_texels(p, *at->second, table));
     }
   }
   if (!quiet) fmt::print("\n{}\n", table.text());

@@ -1,9 +1,15 @@
 // What a command writes: names that collide, places that cannot be written, leftovers.
 #include "tools/limn/output_files.h"
 
+#include <sys/stat.h>
+
+#include <algorithm>
 #include <cctype>
 #include <filesystem>
 #include <fstream>
+#include <map>
+#include <optional>
+#include <utility>
 
 #include "limn/core/error.h"
 #include "limn/core/image.h"
@@ -14,11 +20,50 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool same_file(const std::string& a, const std::string& b) {
-  std::error_code failed;
-  if (fs::equivalent(a, b, failed)) return true;  // also by links
-  return fs::weakly_canonical(a, failed) == fs::weakly_canonical(b, failed);
-}
+// Files in the order in which they are added, found by any of their names, also by links.
+class NamedFiles {
+ public:
+  NamedFiles() = default;
+  explicit NamedFiles(const std::vector<std::string>& files) {
+    for (const std::string& file : files) add(file);
+  }
+
+  void add(const std::string& file) {
+    names_.emplace(canonical(file), count_);
+    if (const auto node = node_of(file)) nodes_.emplace(*node, count_);
+    ++count_;
+  }
+  // The number of the first one that is this file; none: count().
+  size_t find(const std::string& file) const {
+    size_t first = count_;
+    if (const auto name = names_.find(canonical(file)); name != names_.end()) first = name->second;
+    if (const auto node = node_of(file)) {
+      if (const auto at = nodes_.find(*node); at != nodes_.end())
+        first = std::min(first, at->second);
+    }
+    return first;
+  }
+  bool has(const std::string& file) const { return find(file) < count_; }
+  size_t count() const { return count_; }
+
+ private:
+  using Node = std::pair<dev_t, ino_t>;
+
+  static std::string canonical(const std::string& file) {
+    std::error_code failed;
+    return fs::weakly_canonical(file, failed).string();
+  }
+  // Of a file that exists.
+  static std::optional<Node> node_of(const std::string& file) {
+    struct stat found;
+    if (stat(file.c_str(), &found) != 0) return {};
+    return Node(found.st_dev, found.st_ino);
+  }
+
+  size_t count_ = 0;
+  std::map<std::string, size_t> names_;
+  std::map<Node, size_t> nodes_;
+};
 
 bool is_device(const std::string& file) {
   std::error_code failed;
@@ -95,23 +140,22 @@ std::string file_part(const std::string& name) {
 
 void check_outputs(const std::vector<PlannedFile>& files, const Scene& scene,
                    const std::vector<std::string>& inputs) {
-  for (size_t i = 0; i < files.size(); ++i) {
-    const auto& [option, file] = files[i];
+  NamedFiles read(scene.xml_files), before;
+  for (const auto* more : {&scene.data_files, &inputs}) {
+    for (const std::string& file : *more) read.add(file);
+  }
+  std::vector<std::string> options;  // of those before
+  for (const auto& [option, file] : files) {
     if (file.empty() || is_device(file)) continue;
-    for (size_t k = 0; k < i; ++k) {
-      if (files[k].file.empty() || !same_file(file, files[k].file)) continue;
-      throw InputError({file},
-                       files[k].option == option
-                           ? "two outputs (" + option + ") would have this name"
-                           : files[k].option + " and " + option + " would both write this file");
+    if (const size_t k = before.find(file); k < before.count()) {
+      throw InputError({file}, options[k] == option
+                                   ? "two outputs (" + option + ") would have this name"
+                                   : options[k] + " and " + option + " would both write this file");
     }
-    for (const auto* read : {&scene.xml_files, &scene.data_files, &inputs}) {
-      for (const std::string& input : *read) {
-        if (!same_file(file, input)) continue;
-        throw InputError({file}, option + " would write over a file that is read");
-      }
-    }
+    if (read.has(file)) throw InputError({file}, option + " would write over a file that is read");
     check_writable(file);
+    before.add(file);
+    options.push_back(option);
   }
 }
 
@@ -138,6 +182,7 @@ std::string ply_text(const Mesh& mesh, const std::vector<VertexVectors>& vectors
 
 void remove_stale(const std::string& output, const std::vector<std::string>& written) {
   const std::string stem = stem_of(output);
+  const NamedFiles now(written);
   std::error_code failed;
   std::vector<fs::path> stale;
   for (const auto& entry : fs::directory_iterator(fs::absolute(output).parent_path(), failed)) {
@@ -145,17 +190,13 @@ void remove_stale(const std::string& output, const std::vector<std::string>& wri
     if (file.extension() != ".exr" || !entry.is_regular_file(failed)) continue;
     const std::string name = file.stem().string();
     if (name != stem && !name.starts_with(stem + "_")) continue;
-    bool new_one = false;
-    for (const std::string& w : written) new_one = new_one || same_file(file.string(), w);
-    if (!new_one && is_own(file, output)) stale.push_back(file);
+    if (!now.has(file.string()) && is_own(file, output)) stale.push_back(file);
   }
   for (fs::path file : stale) {
     fs::remove(file, failed);
     // Pictures tell nothing of themselves; this one was written with its image.
     file.replace_extension(".png");
-    bool new_one = false;
-    for (const std::string& w : written) new_one = new_one || same_file(file.string(), w);
-    if (!new_one) fs::remove(file, failed);
+    if (!now.has(file.string())) fs::remove(file, failed);
   }
 }
 
