@@ -31,6 +31,7 @@ class Builder {
       : mesh_(mesh), seams_(seams), ids_(edge_vertex_ids(mesh)) {
     result_.shape = shape;
     copy_vertices();
+    result_.planes.reserve(mesh.faces.size());
     for (const FaceIndices& face : mesh.faces) result_.planes.push_back(plane_of(mesh, face));
     group_half_edges();
     result_.one_sided_closed = black_behind && is_closed() && parts_have_volume();
@@ -40,6 +41,7 @@ class Builder {
 
  private:
   void copy_vertices() {
+    result_.positions.reserve(mesh_.positions.size());
     for (const Vec3f& x : mesh_.positions) result_.positions.push_back(cast<double>(x));
     result_.tangents = mesh_.position_tangents;
     for (const FaceIndices& face : mesh_.faces)
@@ -52,6 +54,9 @@ class Builder {
     const auto ends = [](const HalfEdge& s) {
       return std::pair(std::min(s.from, s.to), std::max(s.from, s.to));
     };
+    result_.edges.reserve(sides_.size() / 2);  // of a closed mesh
+    result_.face_offsets.reserve(sides_.size() / 2 + 1);
+    result_.incident_faces.reserve(sides_.size());
     result_.face_offsets.push_back(0);
     for (size_t begin = 0, end; begin < sides_.size(); begin = end) {
       for (end = begin; end < sides_.size() && ends(sides_[end]) == ends(sides_[begin]); ++end)

@@ -18,6 +18,7 @@
 #include <optional>
 #include <set>
 #include <tuple>
+#include <utility>
 
 #include "edgetree/edges/contacts.h"
 #include "edgetree/edges/fold.h"
@@ -41,7 +42,7 @@ class Unifier {
  public:
   Unifier(std::span<const TouchingShape> shapes, const Vec3d& viewer,
           std::vector<EdgeMesh>& objects)
-      : shapes_(shapes), viewer_(viewer), objects_(objects), before_(objects) {
+      : shapes_(shapes), viewer_(viewer), objects_(objects) {
     find_speeds();
   }
 
@@ -77,16 +78,16 @@ class Unifier {
     std::vector<Incidence> incidences;
   };
 
-  const Edge& edge(EdgeRef id) const { return before_[id.object.index()].edge(id.edge); }
+  const Edge& edge(EdgeRef id) const { return objects_[id.object.index()].edge(id.edge); }
   Vec3d position(EdgeRef id, double t) const {
-    const EdgeMesh& mesh = before_[id.object.index()];
+    const EdgeMesh& mesh = objects_[id.object.index()];
     const auto [a, b] = edge(id).vertices;
     if (t == 0) return mesh.position(a);
     if (t == 1) return mesh.position(b);
     return mesh.position(a) + (mesh.position(b) - mesh.position(a)) * t;
   }
   Vec3<Lanes> velocity(EdgeRef id, double t) const {
-    const EdgeMesh& mesh = before_[id.object.index()];
+    const EdgeMesh& mesh = objects_[id.object.index()];
     if (mesh.tangents.empty()) return {};
     const auto [a, b] = edge(id).vertices;
     return mesh.tangent(a) * (1 - t) + mesh.tangent(b) * t;
@@ -94,10 +95,10 @@ class Unifier {
   Corners corners(FaceRef face) const {
     return face_corners<double>(*shapes_[face.shape.index()].mesh, face.face);
   }
-  const Plane& plane(FaceRef face) const { return before_[face.shape.index()].plane(face.face); }
+  const Plane& plane(FaceRef face) const { return objects_[face.shape.index()].plane(face.face); }
   double size(EdgeRef id) const {
     const size_t object = id.object.index();
-    return size_around(before_[object], *shapes_[object].mesh, id.edge);
+    return size_around(objects_[object], *shapes_[object].mesh, id.edge);
   }
 
   // Velocity of the point x of the face's plane.
@@ -182,7 +183,7 @@ class Unifier {
             own ? velocity(id, i == 0 ? t0 : t1) : velocity(face, position(id, i == 0 ? t0 : t1));
       around.push_back(n);
     };
-    for (const FaceRef face : before_[id.object.index()].faces_around(id.edge))
+    for (const FaceRef face : objects_[id.object.index()].faces_around(id.edge))
       add(face, id.edge, true);
     const double middle = 0.5 * (t0 + t1);
     for (const Contact& contact : contacts)
@@ -193,7 +194,7 @@ class Unifier {
     const bool flat = edge(id).edge_class == EdgeClass::kFlat;
     if (around.back().own || flat) {
       if (!around.back().own) add_crossing(id, part.edge, around);
-      const auto faces = before_[id.object.index()].faces_around(id.edge);
+      const auto faces = objects_[id.object.index()].faces_around(id.edge);
       part.faces.assign(faces.begin(), faces.end());
       part.incidences.resize(faces.size());
     } else if (!unite_part(id, around, part)) {
@@ -254,7 +255,7 @@ class Unifier {
     part.edge.edge_class = EdgeClass::kIrregular;
     part.edge.concave = false;
     // The edge's own faces first, in their order; then others of its mesh.
-    const auto faces = before_[id.object.index()].faces_around(id.edge);
+    const auto faces = objects_[id.object.index()].faces_around(id.edge);
     std::stable_sort(around.begin(), around.end(), [&](const Neighbour& a, const Neighbour& b) {
       return rank(a, id, faces) < rank(b, id, faces);
     });
@@ -516,8 +517,11 @@ class Unifier {
 
   // parts: sorted by edge, a whole edge before its parts.
   void rewrite(uint32_t object, std::span<const Part> parts, std::span<const NearFace> near) {
-    const EdgeMesh& old = before_[object];
     EdgeMesh& mesh = objects_[object];
+    EdgeMesh old;
+    old.edges = std::exchange(mesh.edges, {});
+    old.face_offsets = std::exchange(mesh.face_offsets, {0});
+    old.incident_faces = std::exchange(mesh.incident_faces, {});
     struct Source {
       const Edge* edge;
       const Part* part;  // null: the edge is unchanged
@@ -538,9 +542,10 @@ class Unifier {
     };
     std::sort(sources.begin(), sources.end(),
               [&](const Source& a, const Source& b) { return ends(a) < ends(b); });
-    mesh.edges.clear();
-    mesh.face_offsets.assign(1, 0);
-    mesh.incident_faces.clear();
+    mesh.edges.reserve(sources.size());
+    mesh.face_offsets.reserve(sources.size() + 1);
+    mesh.incident_faces.reserve(old.incident_faces.size());
+    mesh.near_offsets.reserve(sources.size() + 1);
     mesh.near_offsets.assign(1, 0);
     for (const Source& source : sources) {
       mesh.edges.push_back(*source.edge);
@@ -568,7 +573,6 @@ class Unifier {
   std::span<const TouchingShape> shapes_;
   const Vec3d viewer_;
   std::vector<EdgeMesh>& objects_;
-  const std::vector<EdgeMesh> before_;
   Lanes speeds_;                                 // largest component of a velocity
   std::map<uint32_t, std::vector<Part>> parts_;  // of each object
   std::vector<ContactLine> lines_;

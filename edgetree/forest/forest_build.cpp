@@ -6,6 +6,7 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
+#include <utility>
 
 #include "edgetree/forest/forest_query.h"
 #include "edgetree/forest/forest_split.h"
@@ -250,20 +251,30 @@ void link(std::span<const NodeId> ids, Forest& forest) {
     }
 }
 
-// Appends a tree over wedges, or above the trees for which they stand. Returns its root.
-NodeId append_tree(std::span<const Wedge> wedges, std::span<const NodeId> trees,
-                   const TreeKind& kind, int threads, const ForestConfig& config, Forest& forest) {
-  const ForestShape tree = split_edges(wedges, config.width, threads);
-  std::vector<Wedge> sorted(wedges.size());
-  std::vector<NodeId> below(trees.size());
-  parallel_for((wedges.size() + 4095) / 4096, threads, [&](size_t block) {
-    for (size_t i = 4096 * block; i < std::min(wedges.size(), 4096 * (block + 1)); ++i) {
-      sorted[i] = wedges[tree.order[i]];
-      if (!below.empty()) below[i] = trees[tree.order[i]];
+// Moves wedges[order[i]] to place i, without a copy of all: they are most of the memory of a build.
+void put_in_order(std::vector<uint32_t> order, std::span<Wedge> wedges) {
+  for (uint32_t i = 0; i < order.size(); ++i) {
+    const Wedge first = wedges[i];
+    uint32_t to = i;
+    for (uint32_t from; (from = order[to]) != i; to = from) {
+      wedges[to] = wedges[from];
+      order[to] = to;
     }
-  });
+    wedges[to] = first;
+    order[to] = to;
+  }
+}
+
+// Appends a tree over wedges, which it reorders, or above the trees for which they stand. Returns
+// its root.
+NodeId append_tree(std::span<Wedge> wedges, std::span<const NodeId> trees, const TreeKind& kind,
+                   int threads, const ForestConfig& config, Forest& forest) {
+  ForestShape tree = split_edges(wedges, config.width, threads);
+  std::vector<NodeId> below(trees.size());
+  for (size_t i = 0; i < below.size(); ++i) below[i] = trees[tree.order[i]];
+  put_in_order(std::move(tree.order), wedges);
   const std::vector<NodeId> ids = append_nodes(tree, trees.empty(), forest);
-  const TreeFiller filler(tree, ids, sorted, below, kind, config);
+  const TreeFiller filler(tree, ids, wedges, below, kind, config);
   constexpr size_t kBlock = 64;  // nodes; not tuned
   parallel_for((tree.nodes.size() + kBlock - 1) / kBlock, threads, [&](size_t block) {
     const size_t end = std::min(tree.nodes.size(), kBlock * (block + 1));
@@ -391,15 +402,16 @@ Forest build_forest(const EdgeSamplerInput& input, int threads, const ForestConf
   for (const EdgeMesh& mesh : input.objects)
     motions.push_back(append_motion(mesh, input.lane_scale, forest));
   std::vector<Tree> trees;
-  for_every_tree(
-      input, config.cull_concave, forest, [&](auto& wedges, ShapeId object, ForestGroup group) {
-        const EdgeMesh& mesh = input.object(object);
-        const TreeKind kind{object, motions[object.index()], group};
-        const ObjectMotion motion = forest.motions[kind.motion];
-        set_speeds(mesh, input.lane_scale, motion, wedges);
-        const NodeId root = append_tree(wedges, {}, kind, threads, config, forest);
-        trees.push_back(tree_of(root, stand_in(wedges, group, motion), mesh.of_texture(), forest));
-      });
+  for_every_tree(input, config.cull_concave, forest,
+                 [&](auto& wedges, ShapeId object, ForestGroup group) {
+                   const EdgeMesh& mesh = input.object(object);
+                   const TreeKind kind{object, motions[object.index()], group};
+                   const ObjectMotion motion = forest.motions[kind.motion];
+                   set_speeds(mesh, input.lane_scale, motion, wedges);
+                   const Wedge whole = stand_in(wedges, group, motion);
+                   const NodeId root = append_tree(wedges, {}, kind, threads, config, forest);
+                   trees.push_back(tree_of(root, whole, mesh.of_texture(), forest));
+                 });
   append_roots(trees, threads, config, forest);
   const auto moves = [&](NodeId root) {
     return bits((root < 0 ? forest.edges[~root].speed : forest.inner[root].speed) > 0) != 0;

@@ -27,7 +27,12 @@ void for_every_tree(const EdgeSamplerInput& input, bool cull_concave, Trees& tre
     const EdgeMesh& mesh = input.objects[o];
     trees.extent = std::max(trees.extent, mesh.extent);
     trees.slots.emplace_back(mesh.edges.size(), kNoParent);
+    size_t counts[kForestGroups] = {};
+    for (const Edge& edge : mesh.edges) {
+      if (const auto group = group_of(mesh, edge, cull_concave)) ++counts[static_cast<int>(*group)];
+    }
     std::vector<Wedge> groups[kForestGroups];
+    for (int g = 0; g < kForestGroups; ++g) groups[g].reserve(counts[g]);
     for (uint32_t e = 0; e < mesh.edges.size(); ++e) {
       if (const auto group = group_of(mesh, mesh.edges[e], cull_concave)) {
         groups[static_cast<int>(*group)].push_back(wedge_of(mesh, EdgeId(e)));
