@@ -16,6 +16,7 @@
 #include "integrators/paths/chain_light.h"
 #include "integrators/paths/path_follow.h"
 #include "integrators/paths/path_log.h"
+#include "integrators/terms/vertex_edges.h"
 #include "limn/core/error.h"
 #include "limn/core/exposure.h"
 #include "limn/integrators/options.h"
@@ -152,6 +153,7 @@ class ReverseEstimator::VertexAdjoints {
     PathVertex vertex =
         plain_vertex(surface, scattering, estimator_.scene().shading, bounces, step, key, below);
     vertex.throughput = value(throughput);
+    if (is_unseen(vertex)) return;
     if (!is_constant(surface.p)) vertex.velocity = {{-1, 0, 0, 0}, {0, -1, 0, 0}, {0, 0, -1, 0}};
     for (size_t slot = 0; slot < estimator_.slots(); ++slot) {
       if (!estimator_.adds(slot) || !estimator_.draws_at_vertices(slot)) continue;

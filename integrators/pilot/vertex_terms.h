@@ -9,6 +9,7 @@
 
 #include "integrators/paths/path_log.h"
 #include "integrators/pilot/term_estimator.h"
+#include "integrators/terms/vertex_edges.h"
 
 namespace limn {
 
@@ -79,6 +80,7 @@ class TermEstimator::VertexTerms {
     PathVertex vertex =
         plain_vertex(surface, scattering, estimator_.scene_.shading, bounces, step, key, below);
     vertex.throughput = weight;
+    if (is_unseen(vertex)) return;
     if (motion) vertex.turn = motion->turn;
     TurnedVertex turned;
     if (held_) turned = turned_at(surface, motion, bounces);

@@ -7,6 +7,12 @@
 
 namespace limn {
 
+bool is_unseen(const PathVertex& vertex) {
+  const Scattering<double>& scattering = vertex.scattering;
+  return is_black(vertex.throughput) ||
+         (scattering.bsdf().is_lambertian() && scattering.lobe().albedo == 0);
+}
+
 EdgeQuery query_at(const PathVertex& vertex) {
   EdgeQuery query;
   query.p = vertex.surface.p;

@@ -8,6 +8,8 @@
 namespace limn {
 
 EdgeQuery query_at(const PathVertex& vertex);
+// Whether nothing that arrives at the vertex reaches the viewer, and so no edge adds anything.
+bool is_unseen(const PathVertex& vertex);
 
 // Replaces `drawn` by draws at a vertex of the path that `key` is of, `count` of them: draw i
 // by the path's copy i.

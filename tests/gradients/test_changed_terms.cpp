@@ -198,6 +198,45 @@ TEST(ChangedTerms, ListEdgesForWhatMovesAlone) {
   EXPECT_GT(edges_of("ball.translate.x"), 0u);
 }
 
+// Vertices on black surfaces, or behind them, draw no edges, whatever the derivatives by their
+// colour are.
+TEST(ChangedTerms, DrawNoEdgesWhereNothingIsScattered) {
+  const TempFiles files;
+  SceneParts parts;
+  parts.width = parts.height = 8;
+  const auto body = [&](const std::string& colour) {
+    return square("floor", 2.5, -90, {0, 0, 0}, diffuse("soot", colour)) +
+           obj_shape("ball", write_mesh(files, "ball.obj", icosphere_mesh(1)), true, 0.4,
+                     {0.4, 0.8, 0.2}, diffuse("coal", colour)) +
+           square("lamp", 0.3, 90, {0.3, 2.4, 0.5}, area_light("glow", "30, 25, 20"));
+  };
+  const std::vector<std::string> wrt = {"ball.translate.x", "soot.reflectance.r"};
+  for (const std::string colour : {"0, 0, 0", "0.5, 0.5, 0.5"}) {
+    parts.body = body(colour);
+    const Scene scene = make_scene(files, parts);
+    const bool black = colour == "0, 0, 0";
+    for (const std::string method : {"silhouettes", "forest"}) {
+      uint64_t drawn = 0;
+      const GradientResult result = run(scene, wrt, method);
+      for (const TermRun& term : result.terms)
+        if (term.name == "boundary" || term.name == "direct") drawn += term.cost.samples;
+      EXPECT_EQ(drawn == 0, black) << method;
+      EXPECT_FALSE(is_zero(result.parameters[1].total));
+    }
+    BackwardOptions options;
+    options.parameters = {"ball.translate.x", "soot.reflectance"};
+    RunSettings settings;
+    settings.spp = 16;
+    settings.threads = 1;
+    Image ones(8, 8, 3);
+    std::ranges::fill(ones.data, 1.0f);
+    uint64_t drawn = 0;
+    for (const TermRun& term : backward(scene, ones, options, settings).terms)
+      if (term.name == "boundary" || term.name == "direct") drawn += term.cost.samples;
+    EXPECT_EQ(drawn == 0, black);
+  }
+}
+
 // Counts of samples are in the order of the scene's terms, also where some are left out.
 TEST(ChangedTerms, TakeTheirOwnCounts) {
   const TempFiles files;
