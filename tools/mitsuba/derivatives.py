@@ -4,21 +4,25 @@
     tools/mitsuba/derivatives.py DIR [-o FOLDER] [--only TEXT] [--film N] [--seconds N]
         [--minutes N] [--path DIR] [-D name=value] [--at-least N]
 
-Scenes: those that limn opens (census.py), without smooth lobes (edges seen by way of these are
-missing, which `check` says itself). Copies of their XML have films of N by N pixels (8) without a
-crop. In each, one parameter of each kind that `limn info` lists is checked twice: against finite
-differences, and reverse mode against forward mode. A kind is the last part of a name, with its
-owner where that is a sensor or a light.
+Scenes: those that limn opens (census.py). Copies of their XML have films of N by N pixels (8)
+without a crop. In each, one parameter of each kind that `limn info` lists is checked three times. A
+kind is the last part of a name, with its owner where that is a sensor or a light.
 
-All kinds of a scene share a reverse run, and those that it cannot tell a longer one. A forward
-check takes `--time` of FIRST_SECONDS, which grows to --seconds (12) at most where it cannot tell,
-those that want least first. Where a derivative is zero without noise, up to three parameters of the
-kind are tried. An array moves along one field (vertices by the same vector, texels by the same
-amount), or by one of its numbers; in reverse mode along a random one.
+paths: `limn gradient` and `limn backward` along the same random paths (term interior), whose dot
+products with a random adjoint must be equal but for rounding. Reverse mode has no other term where
+nothing moves.
+reverse: `limn check --reverse`, all terms, where something moves. All kinds of a scene share a run,
+and those that it cannot tell a longer one. A check agrees if an error as large as the derivative
+would show.
+forward: `limn check`. Samples grow from FIRST_SPP, for --seconds (12) of processor time at most,
+where it cannot tell, those that want least first. Where a derivative is zero without noise, up to
+three parameters of the kind are tried. Verdicts are those of `check`, which tells where an error of
+a tenth of all terms' magnitudes would show; "agree coarsely" says that one as large as the whole
+derivative would.
 
-Forward verdicts are those of `check`, which tells where an error of a tenth of all terms'
-magnitudes would show; "agree coarsely" says that one as large as the whole derivative would.
-A reverse check agrees if an error as large as the derivative would show.
+An array moves along one field (vertices by the same vector, texels by the same amount), or by one
+of its numbers; in `check --reverse` along a random one. Scenes with smooth lobes have the first
+check alone: edges seen by way of these are missing, which `check` says itself.
 
 Results are kept in FOLDER/results.json (out/derivatives) and a later call goes on from there; after
 a change of limn, remove it. The exit status is 1 where a check disagrees, or fewer than --at-least
@@ -42,9 +46,13 @@ import census  # noqa: E402
 import common  # noqa: E402
 import exr  # noqa: E402
 
-FIRST_SECONDS = 1.5
-GROWTH = 4  # of the time, from run to run
+FIRST_SPP = 256
+GROWTH = 4  # of the samples, from run to run
 REVERSE_SPP = 64
+PATHS_SPP = 16
+# The pixels of gradients are rounded to floats, as are the numbers of arrays.
+ROUNDING = 2.0**-23
+CANCELS = 2.0**-44  # of the scene's largest derivative: what rounding leaves of light that cancels
 TRIES = 3
 # Quantiles of a normal score: the two-sided level of `check`, 1e-4, and 95 % power.
 VISIBLE = 3.89 + 1.64
@@ -55,7 +63,9 @@ SMOOTH = re.compile(r"\b(conductor|dielectric|thindielectric|plastic)\b")
 TIME_POWER = 2.5
 WANTED = 0.1  # of an error that shows, over all terms' magnitudes
 COARSELY, ZERO = "agree coarsely", "agree: zero"
-FORWARD, REVERSE = "forward", "reverse"
+FORWARD, REVERSE, PATHS = "forward", "reverse", "paths"
+# Kinds whose derivative has terms of edges or of the filter.
+MOVES = re.compile(r"sensor\..*|(light\.)?(translate|rotate|scale|vertex_positions|displacement)")
 DECIDED = ("disagree", "agree", "not complete")
 
 
@@ -179,19 +189,18 @@ class Check:
             "verdict": "not run"}
 
     def next(self, most_seconds):
-        """(order, parameter, seconds) of a forward run, or None where nothing is left."""
+        """(order, parameter, samples) of a forward run, or None where nothing is left."""
         if first_of(self.runs.values(), *DECIDED):
             return None
         open_runs = [(p, r) for p, r in self.runs.items()
                      if r["verdict"] in (COARSELY, "cannot tell")]
         for parameter, run in open_runs:
-            seconds = min(GROWTH * run["seconds"], most_seconds)
-            if seconds > run["seconds"] and math.isfinite(run["growth"]):
-                return run["growth"] * run["seconds"], parameter, seconds
+            if GROWTH * run["seconds"] <= most_seconds and math.isfinite(run["growth"]):
+                return run["growth"] * run["seconds"], parameter, GROWTH * run["spp"]
         untried = [name for name, _ in self.candidates if name not in self.runs]
         if open_runs or not untried:
             return None
-        return self.rank - 1e6, untried[0], min(FIRST_SECONDS, most_seconds)
+        return self.rank - 1e6, untried[0], FIRST_SPP
 
 
 class Scene:
@@ -199,14 +208,13 @@ class Scene:
         self.file, self.name, self.options = file, name, options
 
     def read(self, limn, folder):
-        """False where the scene has smooth lobes."""
         file = os.path.join(folder, "info.json")
         command = [limn, "info", self.file, *self.options]
         self.description = subprocess.run(command + ["--json", file], capture_output=True,
                                           text=True, check=True).stdout
         self.info = common.read_json(file)
         bsdfs = " ".join(re.sub(r"bitmap \S+", "", s["bsdf"]) for s in self.info["shapes"])
-        return not SMOOTH.search(bsdfs)
+        self.smooth = bool(SMOOTH.search(bsdfs))
 
 
 def run_check(arguments, scene, options):
@@ -221,13 +229,78 @@ def run_check(arguments, scene, options):
     return common.read_json(file), "\n".join(errors)[:300] or f"exit status {done.returncode}"
 
 
-def run_forward(arguments, check, parameter, seconds):
+def user_seconds():
+    return os.times().children_user
+
+
+def run_forward(arguments, check, parameter, spp):
     scene = check.scene
     wrt = direction_of(arguments.output, parameter, dict(check.candidates)[parameter],
                        scene.description)
-    reports, message = run_check(arguments, scene, ["--wrt", wrt, "--time", str(seconds)])
+    before = user_seconds()
+    reports, message = run_check(arguments, scene, ["--wrt", wrt, "--spp", str(spp)])
     result = forward_result(reports[0]) if reports else {"verdict": "refused", "message": message}
-    check.runs[parameter] = {"wrt": wrt, "seconds": seconds, **result}
+    check.runs[parameter] = {**result, "wrt": wrt, "spp": spp, "seconds": user_seconds() - before}
+
+
+def run_limn(arguments, scene, command, options):
+    """The error message, "" where it ran."""
+    done = subprocess.run([arguments.limn, command, scene.file, "--threads", "1", "--quiet",
+                           "--method", "forest", "--terms", "interior", "--seed", "1", "--spp",
+                           str(PATHS_SPP), *scene.options, *options],
+                          capture_output=True, text=True, check=False)
+    return done.stderr[-300:] or "failed" if done.returncode else ""
+
+
+def reverse_numbers(entry, wrt):
+    """Of a parameter of `limn backward`, those that a direction of forward mode moves, at 1."""
+    if "array" not in entry:
+        return np.atleast_1d(entry["value"])
+    numbers = np.load(entry["array"]).astype(float)
+    if ".displacement." in wrt:  # copies of the first vertex share its derivative
+        return numbers[numbers == numbers[0]]
+    if ":" not in wrt:
+        return numbers.ravel()[:1]
+    return numbers[:, 0] if entry["name"].endswith(".vertex_positions") else numbers
+
+
+def run_paths(arguments, scene, checks):
+    """Compares both modes along the same paths; where one parameter is refused, each alone."""
+    names = [check.candidates[0][0] for check in checks]
+    wrts = [direction_of(arguments.output, *check.candidates[0], scene.description)
+            for check in checks]
+    stem, folder, adjoint_file = (os.path.join(arguments.output, name)
+                                  for name in ("paths", "paths_reverse", "adjoint.exr"))
+    message = run_limn(arguments, scene, "gradient", [
+        "--samples", "1", "-o", stem + ".exr", *[x for wrt in wrts for x in ("--wrt", wrt)]])
+    if not message:
+        files = [stem + "".join(["_" + re.sub("[^A-Za-z0-9.-]", "_", wrt)] * (len(wrts) > 1)) + ".exr"
+                 for wrt in wrts]
+        images = [np.stack([exr.read(file)[c] for c in "RGB"]) for file in files]
+        adjoint = np.random.default_rng(1).random(images[0].shape[1:], dtype=np.float32)
+        with open(adjoint_file, "wb") as stream:
+            stream.write(exr.rgb_bytes(adjoint))
+        adjoint = exr.read(adjoint_file)["R"].astype(float)  # rounded to halves
+        message = run_limn(arguments, scene, "backward", [
+            "--pixels", "uniform", "--adjoint", adjoint_file, "-o", folder,
+            *[x for name in names for x in ("--wrt", name)]])
+    if message and len(checks) > 1:
+        for check in checks:
+            run_paths(arguments, scene, [check])
+        return
+    if message:
+        checks[0].runs[names[0]] = {"wrt": wrts[0], "verdict": "refused", "message": message}
+        return
+    entries = common.read_json(os.path.join(folder, "gradient.json"))["parameters"]
+    both = [(adjoint * image, reverse_numbers(entry, wrt))
+            for image, entry, wrt in zip(images, entries, wrts)]
+    sizes = [np.abs(products).sum() + np.abs(numbers).sum() for products, numbers in both]
+    for i, (products, numbers) in enumerate(both):
+        forward, reverse = products.sum(), numbers.sum()
+        most = ROUNDING * sizes[i] + CANCELS * max(sizes)
+        verdict = "disagree" if abs(forward - reverse) > most else "agree" if sizes[i] else ZERO
+        checks[i].runs[names[i]] = {"wrt": wrts[i], "verdict": verdict, "forward": forward,
+                                    "reverse": reverse, "rounding": most}
 
 
 def run_reverse(arguments, scene, checks, spp=REVERSE_SPP):
@@ -235,9 +308,9 @@ def run_reverse(arguments, scene, checks, spp=REVERSE_SPP):
     processor time; or each in its own, where one is refused."""
     names = [check.candidates[0][0] for check in checks]
     options = [option for name in names for option in ("--wrt", name)]
-    before = os.times()
+    before = user_seconds()
     reports, message = run_check(arguments, scene, ["--reverse", "--spp", str(spp), *options])
-    seconds = os.times().children_user - before.children_user
+    seconds = user_seconds() - before
     if not reports and len(checks) > 1:
         for check in checks:
             run_reverse(arguments, scene, [check])
@@ -259,7 +332,8 @@ def checks_of(scenes, results):
     checks = [Check(scene, kind, mode, candidates,
                     results.setdefault(f"{scene.name} {kind} {mode}", {}))
               for scene in scenes for kind, candidates in kinds_of(scene.info).items()
-              for mode in (FORWARD, REVERSE)]
+              for mode in (PATHS, REVERSE, FORWARD)
+              if mode == PATHS or not scene.smooth and (mode == FORWARD or MOVES.fullmatch(kind))]
     before = collections.Counter()
     for check in checks:
         before[check.kind, check.mode] += 1
@@ -268,7 +342,8 @@ def checks_of(scenes, results):
 
 
 def work_off(arguments, checks, results):
-    """Reverse runs, then the forward run that comes first, until the time is over."""
+    """Runs along the same paths, reverse runs, then the forward run that comes first, until the
+    time is over."""
     end = time.monotonic() + 60 * arguments.minutes
 
     def keep(done):
@@ -277,21 +352,22 @@ def work_off(arguments, checks, results):
             run = list(check.runs.values())[-1]
             print(f"{check.scene.name:58} {check.mode} {run['wrt']}: {run['verdict']}", flush=True)
 
-    reverse = collections.defaultdict(list)
-    for check in checks:
-        if check.mode == REVERSE and not check.runs:
-            reverse[check.scene].append(check)
-    for scene, some in reverse.items():
-        if time.monotonic() < end:
-            run_reverse(arguments, scene, some)
-            keep(some)
+    for mode, run_mode in ((PATHS, run_paths), (REVERSE, run_reverse)):
+        left = collections.defaultdict(list)
+        for check in checks:
+            if check.mode == mode and not check.runs:
+                left[check.scene].append(check)
+        for scene, some in left.items():
+            if time.monotonic() < end:
+                run_mode(arguments, scene, some)
+                keep(some)
     forward = [check for check in checks if check.mode == FORWARD]
     steps = {i: check.next(arguments.seconds) for i, check in enumerate(forward)}
     steps = {i: step for i, step in steps.items() if step}
     while steps and time.monotonic() < end:
         i = min(steps, key=lambda i: steps[i][0])
-        _, parameter, seconds = steps.pop(i)
-        run_forward(arguments, forward[i], parameter, seconds)
+        _, parameter, spp = steps.pop(i)
+        run_forward(arguments, forward[i], parameter, spp)
         keep([forward[i]])
         step = forward[i].next(arguments.seconds)
         if step:
@@ -315,6 +391,17 @@ def print_table(checks):
             print(f"{check.scene.name}: {check.mode} {json.dumps(result)}")
 
 
+def print_scenes(mode, checks):
+    verdicts = collections.defaultdict(set)
+    for check in checks:
+        verdicts[check.scene.name].add(check.result()["verdict"])
+    agree = {"agree", COARSELY, ZERO}
+    told = sum(bool(v & agree) and "disagree" not in v for v in verdicts.values())
+    print(f"{mode}: all kinds agree in {sum(v <= agree for v in verdicts.values())} of "
+          f"{len(verdicts)} scenes, all that could be told in {told}, "
+          f"{sum('disagree' in v for v in verdicts.values())} disagree")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -324,13 +411,13 @@ def main():
                         help="scenes whose path contains this")
     parser.add_argument("--film", type=int, default=8, metavar="N", help="pixels of a side")
     parser.add_argument("--seconds", type=common.positive, default=12, metavar="N",
-                        help="of one forward check, at most")
+                        help="of processor time for one forward check, at most")
     parser.add_argument("--minutes", type=common.positive, default=60, metavar="N",
                         help="of this call")
     arguments = census.read_arguments(parser)
     copies = os.path.join(arguments.output, "scenes")
     copy_scenes(arguments.folder, copies, arguments.film)
-    scenes, smooth = [], 0
+    scenes = []
     for file in census.find_scenes(copies):
         name = os.path.relpath(file, copies)
         if arguments.only not in name:
@@ -340,21 +427,18 @@ def main():
         if message:
             continue
         scene = Scene(file, name, options)
-        if scene.read(arguments.limn, arguments.output):
-            scenes.append(scene)
-        else:
-            smooth += 1
+        scene.read(arguments.limn, arguments.output)
+        scenes.append(scene)
     results = common.read_json(os.path.join(arguments.output, "results.json")) or {}
     checks = checks_of(scenes, results)
     left = work_off(arguments, checks, results)
     print_table(checks)
     counts = collections.Counter(check.result()["verdict"] for check in checks)
-    told = [s.name for s in scenes
-            if {c.result()["verdict"] for c in checks if c.scene is s} <= {"agree", ZERO}]
     print(f"{counts['agree']} of {len(checks)} checks agree, {counts[COARSELY]} more coarsely, "
-          f"{counts[ZERO]} are zero, {counts['disagree']} disagree, in "
-          f"{len(scenes)} scenes ({smooth} more have smooth lobes); in {len(told)} all agree; "
-          f"{left} checks can go on")
+          f"{counts[ZERO]} are zero, {counts['disagree']} disagree, in {len(scenes)} scenes "
+          f"({sum(scene.smooth for scene in scenes)} with smooth lobes); {left} can go on")
+    for mode in (PATHS, REVERSE, FORWARD):
+        print_scenes(mode, [check for check in checks if check.mode == mode])
     return 1 if counts["disagree"] or counts["agree"] < arguments.at_least else 0
 
 
