@@ -178,8 +178,10 @@ double best_step(std::span<const StepTrial> trials, double samples) {
     const double scale = square / (square - 1) / (k == 0 ? square : 1);
     biases.push_back(change * scale * scale);
   }
+  // Edges on the film that cross the borders of pixels within the step bias their derivatives as a
+  // whole: so many do that the mean of the squares falls with h, and no slower.
   for (size_t k = trials.size() - 1; k-- > 0;)
-    biases[k] = std::min(biases[k], biases[k + 1] / square);
+    biases[k] = std::min(biases[k], biases[k + 1] / factor);
   for (size_t k = 0; k < trials.size(); ++k)
     errors.push_back(biases[k] + trials[k].variance / std::max(1.0, samples));
   const auto least = std::min_element(errors.begin(), errors.end());

@@ -20,7 +20,7 @@ void extrapolate_variances(std::span<StepTrial> trials);
 // grows with h^2, which gives the squared bias of a step from its change, and that of the first
 // from the second's; around the best trial the variance is taken for a power of h. A change is
 // taken for its error more than was found: a short pilot cannot tell it from none. Its square falls
-// as h^2 at least, whatever was found.
+// as h at least, whatever was found.
 double best_step(std::span<const StepTrial> trials, double samples);
 
 // The samples per pixel of a run that takes `per_second` and has `left` seconds behind its pilot,
