@@ -114,7 +114,7 @@ BackwardResult backward(const Scene& scene, const Image& adjoint, const Backward
                         const RunSettings& requested) {
   check(options);
   const Stopwatch watch;
-  const RunSettings settings = settings_for(options.points, requested);
+  RunSettings settings = settings_for(options.points, requested);
   if (options.points == FilmPoints::kFaces) {
     auto faces = std::make_unique<FacesGradient>(scene, adjoint, options, settings.threads);
     return run(scene, std::move(faces), adjoint, options, settings, watch);
@@ -143,7 +143,8 @@ std::vector<std::string> trace_backward(const Scene& scene, const Image& adjoint
     trace(FacesGradient(scene, adjoint, options, settings.threads));
   } else {
     const Stopwatch watch;
-    trace(*planned(scene, adjoint, options, settings, watch).estimator);
+    RunSettings own = settings;
+    trace(*planned(scene, adjoint, options, own, watch).estimator);
   }
   return log;
 }

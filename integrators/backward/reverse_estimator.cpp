@@ -93,7 +93,7 @@ std::vector<double> ReverseEstimator::possible_samples(size_t slot) const {
   if (!term || slot == pixel_slot_ || is_filter(slot)) return {samples_of(slot)};
   if (types_[slot]->on_film_alone()) return {0.25, 0.5, 1, 2, 4, 8, 16};
   if (types_[slot]->regions) return {0.25, 0.5, 1, 2, 4, 8};
-  return {1, 2, 3, 4, 6, 8};
+  return {1, 2, 3};
 }
 
 void ReverseEstimator::describe(BackwardResult& result) const {

@@ -6,11 +6,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <map>
 
 #include "integrators/estimates/film_batch.h"
-#include "integrators/pilot/allocation.h"
+#include "integrators/terms/direct_edges.h"
 #include "limn/core/exposure.h"
 #include "limn/core/names.h"
 #include "limn/core/parallel.h"
@@ -19,18 +20,31 @@
 namespace limn {
 namespace {
 
-// Of every term: degrees of freedom, and the fewest and most paths that one of them has. Not tuned.
-constexpr size_t kBatches = 32, kFewestPaths = 32, kMostPaths = 256;
+// Of every term: degrees of freedom, and paths that each of them has. Always as many, so that runs
+// of any length have the same plan, with a limit of time or in parts, too. Not tuned.
+constexpr size_t kBatches = 16, kPaths = 64;
 // A path that a pilot looks at with every term of both methods takes as long as so many of a run's.
 constexpr double kCostOfProbe = 10;  // not tuned
-constexpr double kShare = 1.0 / 8;   // of a run, for pilots
-// What a choice must leave of squared error x work to be preferred to the usual numbers. Not tuned.
-constexpr double kConvincing = 0.8;
+// The same of each number of a gradient, which every batch gathers, and of each face, which both
+// methods set up: 0.03 to 0.5 timed in four scenes.
+constexpr double kCostOfNumber = 0.2;
+constexpr double kShare = 1.0 / 8;  // of a run, at most, for pilots
+// Of the variance at vertices, what further samples at the same ones leave: in a room lit through a
+// window, eight in place of one leave .21 to .49 of it. Not tuned.
+constexpr double kKept = 0.5;
+// What a choice must leave of squared error x work to be preferred to the usual numbers: where a
+// lattice before a sky promised 0.59 to 0.72 on average, one of five motions got 1.2 to 2.6.
+constexpr double kConvincing = 0.5;
 // The edges that `forest` draws before lights have rare and large samples, most of which a pilot
-// misses; listed silhouettes have none. So those are preferred unless the pilot finds `forest`
-// better by this factor: in gloss and beside a lamp of 1,886 faces, without it, one of two adjoints
-// got `forest`, and 7 to 23 times the squared error x time.
+// misses; listed silhouettes have none. So their variance is taken to be so many times what the
+// pilot finds: in gloss and beside a lamp of 1,886 faces, without it, one of two adjoints got
+// `forest`, and 7 to 23 times the squared error x time.
 constexpr double kUnseen = 4;
+
+// In the unit of Term::work: 15 to 110 for 6 to 400 pieces, timed in five scenes.
+double list_work(const ListCount& count) {
+  return 10 * static_cast<double>(count.lists) + 0.4 * static_cast<double>(count.pieces);
+}
 
 // A derivative of the loss along a direction of one parameter, in comparable units.
 struct Direction {
@@ -56,11 +70,35 @@ std::vector<Vec3d> places_of(const Scene& scene, const Parameter& parameter) {
   return places;
 }
 
-// Numbers and channels one by one; of arrays smooth random fields, as what optimisers make of
-// gradients is smooth: the noise of single vertices is another, and large.
-std::vector<Direction> directions_of(const Scene& scene, const std::vector<Parameter>& parameters) {
-  constexpr int kFields = 4;      // not tuned
+// Of a shape: shifts, turns and smooth random fields, as what optimisers make of gradients is
+// smooth: the noise of single vertices is another, and large.
+std::vector<std::function<Vec3d(const Vec3d&)>> smooth_fields() {
+  constexpr uint64_t kWaves = 2;  // not tuned
   constexpr double kPeriods = 2;  // over the shape; not tuned
+  std::vector<std::function<Vec3d(const Vec3d&)>> fields;
+  for (const Vec3d& axis : {Vec3d{1, 0, 0}, Vec3d{0, 1, 0}, Vec3d{0, 0, 1}}) {
+    fields.emplace_back([axis](const Vec3d&) { return axis; });
+    fields.emplace_back([axis](const Vec3d& x) { return cross(axis, x); });
+  }
+  for (uint64_t i = 0; i < kWaves; ++i) {
+    Rng rng(0, i, 0);
+    std::array<Vec3d, 3> waves;
+    Vec3d phases;
+    for (int k = 0; k < 3; ++k) {
+      for (int j = 0; j < 3; ++j) waves[k][j] = 2 * kPi * kPeriods * (2 * rng.uniform() - 1);
+      phases[k] = 2 * kPi * rng.uniform();
+    }
+    fields.emplace_back([waves, phases](const Vec3d& x) {
+      Vec3d value;
+      for (int k = 0; k < 3; ++k) value[k] = std::sin(dot(waves[k], x) + phases[k]);
+      return value;
+    });
+  }
+  return fields;
+}
+
+// Numbers and channels one by one; of arrays smooth fields.
+std::vector<Direction> directions_of(const Scene& scene, const std::vector<Parameter>& parameters) {
   std::vector<Direction> directions;
   for (size_t p = 0; p < parameters.size(); ++p) {
     const Parameter& parameter = parameters[p];
@@ -74,19 +112,11 @@ std::vector<Direction> directions_of(const Scene& scene, const std::vector<Param
     }
     const std::vector<Vec3d> places = places_of(scene, parameter);
     const size_t each = std::max<size_t>(1, count / std::max<size_t>(1, places.size()));
-    for (uint64_t field = 0; field < kFields; ++field) {
-      Rng rng(0, field, 0);
-      std::array<Vec3d, 3> waves;
-      std::array<double, 3> phases;
-      for (size_t k = 0; k < 3; ++k) {
-        for (int j = 0; j < 3; ++j) waves[k][j] = 2 * kPi * kPeriods * (2 * rng.uniform() - 1);
-        phases[k] = 2 * kPi * rng.uniform();
-      }
+    for (const auto& field : smooth_fields()) {
       Direction direction{p, std::vector<double>(count)};
       for (size_t i = 0; i < count; ++i) {
-        const size_t k = i % each % 3;
-        const Vec3d& x = places[std::min(i / each, places.size() - 1)];
-        direction.weights[i] = parameter.natural_step * std::sin(dot(waves[k], x) + phases[k]);
+        const Vec3d value = field(places[std::min(i / each, places.size() - 1)]);
+        direction.weights[i] = parameter.natural_step * value[static_cast<int>(i % each % 3)];
       }
       directions.push_back(std::move(direction));
     }
@@ -94,7 +124,22 @@ std::vector<Direction> directions_of(const Scene& scene, const std::vector<Param
   return directions;
 }
 
-// What single samples of a term come to.
+// What one sample of a term comes to.
+struct ReverseFigures {
+  std::vector<double> variances = {};  // along every direction
+  // What it costs; the part of it that further samples at the same vertex do not take again.
+  double cost = 0, first = 0;
+  bool at_vertices = false;
+
+  // Of the variances, what so many samples leave.
+  double left_by(double samples) const {
+    return at_vertices && samples > 1 ? kKept + (1 - kKept) / samples : 1 / samples;
+  }
+  double cost_of(double samples) const {
+    return cost * samples - first * std::max(samples - 1, 0.0);
+  }
+};
+
 class Probe {
  public:
   Probe(const ReverseEstimator& estimator, const RunSettings& settings, const Stopwatch& watch)
@@ -105,49 +150,61 @@ class Probe {
     settings_.progress = nullptr;
   }
 
-  // paths: of each batch, or as many samples of the film as belong to them.
-  TermFigures figures(ReverseEstimator& estimator, size_t slot, size_t paths) const {
-    estimator.probe(static_cast<double>(paths) / pixels_, slot);
+  // Of the paths of a batch, or as many samples of the film as belong to them.
+  ReverseFigures figures(ReverseEstimator& estimator, size_t slot) const {
+    estimator.probe(kPaths / pixels_, slot);
     ProgressCounter progress(settings_, watch_, 1);
     constexpr uint64_t kStream = 0x9e1107;  // any number
-    std::vector<BatchSums> sums(kBatches);
+    std::vector<std::vector<double>> slopes(kBatches);
+    std::vector<TermCost> costs(kBatches);
+    std::vector<ListCount> lists(kBatches);
     parallel_for(kBatches, settings_.threads, [&](size_t b) {
       const int first = static_cast<int>(b);
-      sums[b] = run_batch(estimator, Batch{mix_bits(settings_.seed + kStream), first, first + 1}, 1,
-                          progress);
+      const Batch batch{mix_bits(settings_.seed + kStream), first, first + 1};
+      const ListCount before = listed_by_thread();
+      const BatchSums sums = run_batch(estimator, batch, 1, progress);
+      const ListCount now = listed_by_thread();
+      lists[b] = {now.lists - before.lists, now.pieces - before.pieces};
+      if (sums.costs.empty()) return;  // interrupted: a run without batches
+      costs[b] = sums.costs[slot];
+      slopes[b] = along_directions(sums.images);
     });
     TermCost cost;
-    for (const BatchSums& batch : sums) {
-      if (batch.costs.empty()) return {};  // interrupted
-      cost.merge(batch.costs[slot]);
-    }
-    // Of a sample.
-    const double each = estimator.samples_of(slot);
+    for (const TermCost& one : costs) cost.merge(one);
+    double listing = 0;
+    for (const ListCount& one : lists) listing += list_work(one);
     const size_t on_film = FilmBatch(estimator, slot, {0, 0, 1}).count;
-    const double count = on_film > 0 ? on_film : static_cast<double>(paths) * each;
-    TermFigures figures;
-    figures.variance = variance(sums) * count;
-    figures.cost = estimator.work(slot, cost) / (kBatches * count);
-    figures.first = estimator.first_work(slot, cost) / (kBatches * count);
-    figures.least = each;
+    const double count = on_film > 0 ? on_film : kPaths * estimator.samples_of(slot);
+    ReverseFigures figures;
+    figures.variances = variances(slopes, count);
+    figures.cost = (estimator.work(slot, cost) + listing) / (kBatches * count);
+    figures.first = (estimator.first_work(slot, cost) + listing) / (kBatches * count);
+    figures.at_vertices = estimator.draws_at_vertices(slot);
     estimator.probe(1, {});
     return figures;
   }
 
  private:
-  // Of what a batch adds, summed over directions.
-  double variance(const std::vector<BatchSums>& sums) const {
-    double result = 0;
-    for (const Direction& direction : directions_) {
+  std::vector<double> along_directions(const std::vector<std::vector<double>>& numbers) const {
+    std::vector<double> slopes(directions_.size());
+    for (size_t d = 0; d < slopes.size(); ++d) {
+      const std::vector<double>& of = numbers[directions_[d].parameter];
+      for (size_t i = 0; i < of.size(); ++i) slopes[d] += directions_[d].weights[i] * of[i];
+    }
+    return slopes;
+  }
+  // Of a sample, along every direction: slopes are those of batches of `count`.
+  std::vector<double> variances(const std::vector<std::vector<double>>& slopes,
+                                double count) const {
+    std::vector<double> result(directions_.size());
+    for (size_t d = 0; d < result.size(); ++d) {
       double first = 0, second = 0;
-      for (const BatchSums& batch : sums) {
-        const std::vector<double>& numbers = batch.images[direction.parameter];
-        double value = 0;
-        for (size_t i = 0; i < numbers.size(); ++i) value += direction.weights[i] * numbers[i];
-        first += value;
-        second += value * value;
+      for (const auto& batch : slopes) {
+        if (batch.empty()) return std::vector<double>(directions_.size());
+        first += batch[d];
+        second += batch[d] * batch[d];
       }
-      result += std::max(0.0, second - first * first / kBatches) / (kBatches - 1);
+      result[d] = count * std::max(0.0, second - first * first / kBatches) / (kBatches - 1);
     }
     return result;
   }
@@ -160,44 +217,57 @@ class Probe {
 
 struct Choice {
   std::vector<double> samples;  // of each slot, for each path
-  double product;               // squared error x work
+  double product;               // squared error x work, in units of the usual one
 };
 
 // One of the methods, with figures of its terms.
 struct Candidate {
   std::unique_ptr<ReverseEstimator> estimator;
-  std::vector<TermFigures> figures = {};
+  std::vector<ReverseFigures> figures = {};
 
   bool has_choice() const {
     for (size_t slot = 0; slot < estimator->slots(); ++slot)
       if (estimator->possible_samples(slot).size() > 1) return true;
     return false;
   }
-  double product(const std::vector<double>& samples) const {
-    double error = 0, work = 0;
+  // Along every direction, with so many samples.
+  std::vector<double> errors(const std::vector<double>& samples) const {
+    std::vector<double> errors;
     for (size_t slot = 0; slot < figures.size(); ++slot) {
       if (samples[slot] == 0) continue;  // where the adjoint is continuous
-      error += figures[slot].variance / samples[slot];
-      work += figures[slot].cost_of(samples[slot]);
+      const std::vector<double>& variances = figures[slot].variances;
+      errors.resize(std::max(errors.size(), variances.size()));
+      for (size_t d = 0; d < variances.size(); ++d)
+        errors[d] += variances[d] * figures[slot].left_by(samples[slot]);
     }
+    return errors;
+  }
+  // units: of the squared error along every direction; all directions count alike.
+  double product(const std::vector<double>& samples, const std::vector<double>& units) const {
+    double error = 0, work = 0;
+    const std::vector<double> list = errors(samples);
+    for (size_t d = 0; d < list.size(); ++d)
+      if (units[d] > 0) error += list[d] / units[d];
+    for (size_t slot = 0; slot < figures.size(); ++slot)
+      if (samples[slot] > 0) work += figures[slot].cost_of(samples[slot]);
     return error * work;
   }
-  Choice plain() const {
+  std::vector<double> usual() const {
     std::vector<double> samples;
     for (size_t slot = 0; slot < figures.size(); ++slot)
       samples.push_back(estimator->samples_of(slot));
-    return {samples, product(samples)};
+    return samples;
   }
   // The numbers of one term after the other, until none would change.
-  Choice best() const {
-    Choice best = plain();
+  Choice best(const std::vector<double>& units) const {
+    Choice best{usual(), product(usual(), units)};
     for (bool changed = true; changed;) {
       changed = false;
       for (size_t slot = 0; slot < figures.size(); ++slot) {
         for (const double count : estimator->possible_samples(slot)) {
           std::vector<double> samples = best.samples;
           samples[slot] = count;
-          const double now = product(samples);
+          const double now = product(samples, units);
           if (now >= 0.99 * best.product) continue;
           best = {samples, now};
           changed = true;
@@ -232,80 +302,99 @@ bool asks_for_regions(const BackwardOptions& options) {
 // Both methods, as far as the scene tells them apart.
 class Pilot {
  public:
+  // settings: of a run with a limit of time, those between which it has a pilot or has none.
   Pilot(const Scene& scene, const Image& adjoint, const BackwardOptions& options,
-        const RunSettings& settings, const Stopwatch& watch)
-      : settings_(settings), watch_(watch) {
+        RunSettings& settings, const Stopwatch& watch) {
     const auto add = [&](const char* method) {
       candidates_.push_back({std::make_unique<ReverseEstimator>(
           scene, adjoint, with_method(options, method), settings.threads)});
     };
     add("forest");
-    probe_ = std::make_unique<Probe>(*candidates_[0].estimator, settings, watch);
     if (!candidates_[0].has_choice()) return;
-    paths_ = paths_of_batch(static_cast<double>(film_size(scene.film)) / 3);
+    const double pixels = static_cast<double>(film_size(scene.film)) / 3;
+    const int least = least_samples(pixels);
+    if (settings.spp < least) return;
+    probe_ = std::make_unique<Probe>(*candidates_[0].estimator, settings, watch);
+    looks_ = fits(least, pixels, settings, watch);
     const bool draws = candidates_[0].estimator->draws_at_vertices();
-    if (paths_ > 0 && draws && LightRegions::any_in(scene)) add("silhouettes");
+    if (looks_ && draws && LightRegions::any_in(scene)) add("silhouettes");
   }
 
   ReversePlan plan() {
-    if (paths_ == 0) return {std::move(candidates_[0].estimator), ""};
+    if (!looks_) return {std::move(candidates_[0].estimator), ""};
     for (Candidate& candidate : candidates_) measure(candidate);
-    const Choice plain = candidates_[0].plain();
+    const std::vector<double> units = candidates_[0].errors(candidates_[0].usual());
+    const double usual = candidates_[0].product(candidates_[0].usual(), units);
     Candidate* chosen = &candidates_[0];
-    Choice best = chosen->best();
+    Choice best = chosen->best(units);
     if (candidates_.size() > 1) {
-      const Choice listed = candidates_[1].best();
-      if (listed.product < kUnseen * best.product) {
+      const Choice listed = candidates_[1].best(units);
+      if (listed.product < best.product) {
         best = listed;
         chosen = &candidates_[1];
       }
     }
-    const bool gains = chosen != &candidates_[0] || best.product < kConvincing * plain.product;
+    const bool gains = chosen != &candidates_[0] || best.product < kConvincing * usual;
     ReversePlan plan{std::move(chosen->estimator), ""};
     if (gains) plan.estimator->set_samples(best.samples);
     plan.decision = fmt::format(
         "pilot of {} paths for each term: {} with {} numbers; squared error x work {:.3g} of that "
         "of forest with the usual numbers",
-        kBatches * paths_, plan.estimator->method_name(), gains ? "these" : "the usual",
-        gains && plain.product > 0 ? best.product / plain.product : 1.0);
+        kBatches * kPaths, plan.estimator->method_name(), gains ? "these" : "the usual",
+        gains && usual > 0 ? best.product / usual : 1.0);
     return plan;
   }
 
  private:
-  // 0: the run is too short, or there is nothing to choose.
-  size_t paths_of_batch(double pixels) const {
-    const double probes = kBatches * kCostOfProbe;
-    double paths = kShare * pixels * settings_.spp / probes;
-    if (settings_.seconds > 0) {
+  // Of a run of which pilots are no more than their share.
+  int least_samples(double pixels) const {
+    double numbers = 0;
+    for (const size_t count : candidates_[0].estimator->sizes())
+      numbers += static_cast<double>(count);
+    for (const Shape& shape : candidates_[0].estimator->scene().shapes)
+      numbers += static_cast<double>(shape.mesh.faces.size());
+    const double paths = kBatches * kPaths * kCostOfProbe + kCostOfNumber * numbers;
+    return static_cast<int>(std::ceil(paths / (kShare * pixels)));
+  }
+  // Whether a run of the least samples with a pilot fits into its time, by a few paths. From then
+  // on it comes to these, or stays below.
+  bool fits(int least, double pixels, RunSettings& settings, const Stopwatch& watch) {
+    if (settings.seconds == 0) return true;
+    if (least > 1) {
       ReverseEstimator& estimator = *candidates_[0].estimator;
-      const double before = watch_.seconds();
-      probe_->figures(estimator, estimator.pixel_slot(), kFewestPaths);
-      const double each = std::max(watch_.seconds() - before, 1e-9) / kFewestPaths;
+      const double before = watch.seconds();
+      probe_->figures(estimator, estimator.pixel_slot());
+      const double each = (watch.seconds() - before) / (kBatches * kPaths);
       // Without edges a path takes a fifth of the time.
-      paths = std::min(paths, kShare * (settings_.seconds - before) / (5 * kCostOfProbe * each));
+      if (5 * each * least * pixels > settings.seconds - before) {
+        settings.spp = least - 1;
+        return false;
+      }
     }
-    return paths < kFewestPaths ? 0 : static_cast<size_t>(std::min<double>(paths, kMostPaths));
+    settings.least_spp = std::max(settings.least_spp, least);
+    return true;
   }
   // Terms that no vertex has part in are the same in all.
   void measure(Candidate& candidate) {
+    const bool misses = candidates_.size() > 1 && &candidate == &candidates_[0];
     ReverseEstimator& estimator = *candidate.estimator;
     for (size_t slot = 0; slot < estimator.slots(); ++slot) {
       candidate.figures.emplace_back();
       if (!estimator.computes(slot) || estimator.samples_of(slot) == 0) continue;
       const auto known = alike_.find(estimator.slot_name(slot));
       candidate.figures.back() =
-          known != alike_.end() ? known->second : probe_->figures(estimator, slot, paths_);
+          known != alike_.end() ? known->second : probe_->figures(estimator, slot);
+      if (misses && estimator.draws_at_vertices(slot))
+        for (double& v : candidate.figures.back().variances) v *= kUnseen;
       if (!estimator.draws_at_vertices(slot))
         alike_[estimator.slot_name(slot)] = candidate.figures.back();
     }
   }
 
-  RunSettings settings_;
-  const Stopwatch& watch_;
   std::vector<Candidate> candidates_;
   std::unique_ptr<Probe> probe_;
-  size_t paths_ = 0;
-  std::map<std::string, TermFigures> alike_;
+  bool looks_ = false;
+  std::map<std::string, ReverseFigures> alike_;
 };
 
 }  // namespace
@@ -316,7 +405,7 @@ BackwardOptions without_pilot(const BackwardOptions& options) {
 }
 
 ReversePlan planned(const Scene& scene, const Image& adjoint, const BackwardOptions& options,
-                    const RunSettings& settings, const Stopwatch& watch) {
+                    RunSettings& settings, const Stopwatch& watch) {
   const auto plain = [&](const BackwardOptions& own) {
     return ReversePlan{std::make_unique<ReverseEstimator>(scene, adjoint, own, settings.threads),
                        ""};

@@ -23,9 +23,10 @@ BackwardOptions without_pilot(const BackwardOptions& options);
 // options: of the method `adaptive` or another; then, and where samples, terms or uniform pixels
 // are asked for, in runs too short for a pilot and where the scene has times, there is no pilot:
 // `adaptive` is `forest` then, or `silhouettes` if one of its own terms is asked for. Pilots take
-// about an eighth of the run, which watch has timed since it began. The same seed and samples give
-// the same plan on any number of threads; a limit of time makes it depend on the machine.
+// an eighth of the shortest run that has one, about, or less. The plan follows from the seed, and
+// from whether the samples are enough for a pilot: with a limit of time, which watch has run towards
+// since the run began, settings are left that keep the run on one side.
 ReversePlan planned(const Scene& scene, const Image& adjoint, const BackwardOptions& options,
-                    const RunSettings& settings, const Stopwatch& watch);
+                    RunSettings& settings, const Stopwatch& watch);
 
 }  // namespace limn

@@ -11,6 +11,7 @@ void EqualBatches::set_size(double one_sample) {
   const int most = std::max(2, std::min(most_, settings_.spp));
   const double fitting = (settings_.seconds - now) / std::max(one_sample, 1e-9) / most;
   size_ = static_cast<int>(std::clamp(fitting, 1.0, std::max(1.0, double(settings_.spp) / most)));
+  while (settings_.spp / size_ * size_ < std::min(settings_.least_spp, settings_.spp)) --size_;
   expected_ = size_ * one_sample;
   since_ = size_ == 1 ? now - one_sample : now;
 }

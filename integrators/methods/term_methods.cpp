@@ -112,7 +112,7 @@ std::vector<MethodType> term_methods() {
                                "samples allocated by error; in reverse mode forest or "
                                "silhouettes, and samples per term, as a pilot decides",
                                "silhouettes", {}, motion_settings(true)));
-  methods.back().defaults = {Task::kGradient, Task::kCompare};
+  methods.back().defaults = {Task::kGradient, Task::kBackward, Task::kCompare};
   methods.back().set_up = [gradients = methods.back().set_up](MethodType& to) {
     gradients(to);
     to.reverse.reset();
@@ -140,7 +140,7 @@ std::vector<MethodType> term_methods() {
   methods.back().check = check_closed_light;
   methods.back().image = ImageMethod{.closed_light = true};
   for (MethodType& row : methods) {
-    if (row.name == "forest") row.defaults = {Task::kBackward, Task::kFit};
+    if (row.name == "forest") row.defaults = {Task::kFit};
     if (row.name != "silhouettes") continue;
     row.description += "; images: as lines, or as rays where these take less time";
     row.set_up = [gradients = row.set_up](MethodType& to) {

@@ -45,6 +45,12 @@ void draw_pieces(const EdgeSamplerInput& edges, const std::vector<DirectPieces::
   }
 }
 
+namespace {
+thread_local ListCount listed_here;
+}
+
+ListCount listed_by_thread() { return listed_here; }
+
 void DirectEdges::list(const EdgeQuery& emitters, const EdgeQuery& patches, double u,
                        DirectPieces& to) const {
   static thread_local std::vector<LightRegions::Choice> choices;
@@ -56,6 +62,7 @@ void DirectEdges::list(const EdgeQuery& emitters, const EdgeQuery& patches, doub
     list.push_back({k, piece, before + piece.weight * regions_.luminance(k) / density, density});
   };
   to.clear();
+  ++listed_here.lists;
   regions_.choose(emitters.p, u, choices);
   for (const auto& [k, expected, times] : choices) {
     const EdgeQuery& query = regions_.shape(k).valid() ? emitters : patches;
@@ -67,6 +74,7 @@ void DirectEdges::list(const EdgeQuery& emitters, const EdgeQuery& patches, doub
     cut_edges(edges_, query, *cone, listed, pieces);
     const bool small = regions_.shape(k).valid() &&
                        regions_.hull(k).radius < kSmall * length(regions_.hull(k).center - query.p);
+    listed_here.pieces += pieces.size();
     for (const EdgePiece& piece : pieces) {
       const bool own = small && is_own_edge(k, piece.edge);
       append(own ? to.outlines : to.others, k, piece, expected / times);

@@ -36,6 +36,13 @@ struct DirectPoint {
 void draw_pieces(const EdgeSamplerInput& edges, const std::vector<DirectPieces::Piece>& pieces,
                  Rng rng, int points, int samples, TermCost& cost, std::vector<DirectPoint>& drawn);
 
+// What the calling thread has listed so far. Lists take time that samples and rays do not tell: a
+// pilot charges it by the difference.
+struct ListCount {
+  uint64_t lists = 0, pieces = 0;
+};
+ListCount listed_by_thread();
+
 class DirectEdges {
  public:
   // All must outlive it.

@@ -25,15 +25,17 @@ Scene shadowed(const TempFiles& files) {
   return make_scene(files, parts);
 }
 
-BackwardResult run(const Scene& scene, const char* method, int spp, uint64_t seed,
-                   int threads = 2) {
+BackwardResult run(const Scene& scene, const char* method, int spp, uint64_t seed, int threads = 2,
+                   double seconds = 0, int batches = 16) {
   Image adjoint(scene.film.crop_width, scene.film.crop_height, 3);
   for (size_t i = 0; i < adjoint.data.size(); ++i)
     adjoint.data[i] = static_cast<float>(std::sin(0.1 * static_cast<double>(i / 3)));
   BackwardOptions options;
   options.parameters = {"body.translate.x", "body.translate.y", "body.rotate.z"};
   options.method = Method(method);
+  options.batches = batches;
   RunSettings settings;
+  settings.seconds = seconds;
   settings.spp = spp;
   settings.seed = seed;
   settings.threads = threads;
@@ -63,6 +65,21 @@ TEST(ReversePilot, ChoosesAlikeOnAnyNumberOfThreads) {
   const BackwardResult three = run(scene, "adaptive", 96, 3, 3);
   EXPECT_EQ(one.decision, three.decision);
   EXPECT_EQ(means(one), means(three));
+}
+
+// The plan is that of a run without limit that has as many samples, also where the time has room
+// for none.
+TEST(ReversePilot, ChoosesAlikeInLimitedTime) {
+  const TempFiles files;
+  const Scene scene = shadowed(files);
+  for (const double seconds : {0.01, 4.0}) {
+    const BackwardResult timed = run(scene, "adaptive", 100000, 3, 2, seconds);
+    const int spp = static_cast<int>(timed.spp);
+    const BackwardResult all = run(scene, "adaptive", spp, 3, 2, 0, timed.batches);
+    EXPECT_EQ(timed.decision, all.decision) << spp;
+    EXPECT_EQ(timed.method, all.method);
+    EXPECT_EQ(means(timed), means(all));
+  }
 }
 
 // `boundary` of `forest` has what `silhouettes` leaves to `direct`: a check compares one of both.
@@ -95,6 +112,7 @@ TEST(ReversePilot, GainsAndHasTrueErrorBars) {
   const BackwardResult truth = run(scene, "silhouettes", 512, 1000);
   constexpr int kRuns = 6, kCompared = 2;
   double usual = 0, squares[3] = {}, own = 0;
+  std::string decisions;
   for (int seed = 1; seed <= kRuns; ++seed) {
     const BackwardResult chosen = run(scene, "adaptive", 84, seed);
     const auto work = [](const BackwardResult& result) {
@@ -107,6 +125,10 @@ TEST(ReversePilot, GainsAndHasTrueErrorBars) {
       const double d = b.mean(0) - t.mean(0);
       squares[k] += d * d / (b.variance(0) + t.variance(0));
     }
+    decisions += "seed " + std::to_string(seed) + ": " + chosen.decision;
+    for (const TermRun& term : chosen.terms)
+      decisions += ", " + term.name + " " + std::to_string(term.samples);
+    decisions += "\n";
     if (seed > kCompared) continue;
     const BackwardResult plain = run(scene, "forest", 84, seed);
     for (int k = 0; k < 3; ++k) {
@@ -114,7 +136,7 @@ TEST(ReversePilot, GainsAndHasTrueErrorBars) {
       own += chosen.parameters[k].moments.variance(0) * work(chosen);
     }
   }
-  EXPECT_LT(own, 0.5 * usual);
+  EXPECT_LT(own, 0.5 * usual) << decisions;
   for (const double square : squares) {
     // Of Student's t with 15 degrees of freedom a square has mean 15/13 and variance 3.1: of a sum
     // of six, 7 and 4.3; the bound is at five of them.

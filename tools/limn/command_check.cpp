@@ -178,7 +178,7 @@ class CheckCommand final : public Command {
     app.add_flag("--reverse", reverse_,
                  "Compare reverse mode with forward mode instead, by the sum over pixels of the "
                  "derivative times a random image. An array parameter moves along a random "
-                 "direction. --method is then one of backward (default: forest)")
+                 "direction. --method is then one of backward (default: adaptive)")
         ->excludes("--time");
   }
 

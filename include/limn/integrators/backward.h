@@ -90,8 +90,8 @@ struct BackwardResult {
 // adjoint: crop_height by crop_width, three channels, or one that stands for the luminance.
 // settings.spp paths per pixel, in batches that give the standard errors; interruption
 // drops the batch in progress. With settings.seconds as many batches of one size as fit, two at
-// least: a run without limit with the samples and batches that the result names has the same bits,
-// unless a pilot chose by time.
+// least, and no fewer than a pilot needs where one has run: a run without limit with the samples
+// and batches that the result names has the same bits.
 // The same seed gives the same bits on any number of threads; memory does not grow with samples.
 // InputError for unknown parameters or terms, numbers of samples out of range, and for an adjoint
 // of another size or one that is not finite.

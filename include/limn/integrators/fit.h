@@ -89,7 +89,11 @@ struct FitOptions {
   double sigma_end = 0;
   int loss_spp = 0;  // samples per pixel of each of the two images of the loss; 0: settings.spp
   // Terms and where samples go; `parameters` is not looked at.
-  BackwardOptions backward;
+  BackwardOptions backward = [] {
+    BackwardOptions own;
+    own.method = Method(Task::kFit);
+    return own;
+  }();
 };
 
 // One step.
