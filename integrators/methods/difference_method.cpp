@@ -179,9 +179,16 @@ double best_step(std::span<const StepTrial> trials, double samples) {
     biases.push_back(change * scale * scale);
   }
   // Edges on the film that cross the borders of pixels within the step bias their derivatives as a
-  // whole: so many do that the mean of the squares falls with h, and no slower.
-  for (size_t k = trials.size() - 1; k-- > 0;)
-    biases[k] = std::min(biases[k], biases[k + 1] / factor);
+  // whole: then the mean of the squares falls with h, and no slower; else with h^2 at least.
+  const auto is_found = [&](size_t k) {
+    return trials[k].squared_change > 2 * trials[k].change_error;
+  };
+  double fall = square;
+  for (size_t k = trials.size() - 1; k-- > 0;) {
+    const double ratio = trials[k + 1].squared_change / trials[k].squared_change;
+    if (k > 0 && is_found(k) && is_found(k + 1)) fall = std::clamp(ratio, factor, square);
+    biases[k] = std::min(biases[k], biases[k + 1] / fall);
+  }
   for (size_t k = 0; k < trials.size(); ++k)
     errors.push_back(biases[k] + trials[k].variance / std::max(1.0, samples));
   const auto least = std::min_element(errors.begin(), errors.end());

@@ -19,8 +19,8 @@ void extrapolate_variances(std::span<StepTrial> trials);
 // the same factor times the one before; the squared change of the first is not used. The bias
 // grows with h^2, which gives the squared bias of a step from its change, and that of the first
 // from the second's; around the best trial the variance is taken for a power of h. A change is
-// taken for its error more than was found: a short pilot cannot tell it from none. Its square falls
-// as h at least, whatever was found.
+// taken for its error more than was found: a short pilot cannot tell it from none. The squared bias
+// falls as squared changes do that it can tell, between h and h^2.
 double best_step(std::span<const StepTrial> trials, double samples);
 
 // The samples per pixel of a run that takes `per_second` and has `left` seconds behind its pilot,

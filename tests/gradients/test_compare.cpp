@@ -307,10 +307,10 @@ TEST(Differences, BestStepIsTheMinimum) {
   std::vector<StepTrial> trials = trials_of(10, 1, 0);
   EXPECT_LT(best_step(trials, 100), 0.256);
   // A squared bias that the pilot cannot tell from none may be there, and is less at smaller steps:
-  // 0.0228 beside an error of 0.0039 at the largest, 0.0057 beside 0.0156 at the next.
+  // 0.0228 beside an error of 0.0039 at the largest, 0.0014 beside 0.0156 at the next.
   trials = trials_of(0, 0.1, 1);
   for (StepTrial& trial : trials) trial.change_error = 0.02;
-  EXPECT_NEAR(best_step(trials, 100), 0.064 * std::pow(0.015625 / (4 * 0.0056889), 0.2), 1e-5);
+  EXPECT_NEAR(best_step(trials, 100), 0.064 * std::pow(0.015625 / (4 * 0.0014222), 0.2), 1e-5);
 }
 
 // Edges along the columns of pixels: those within a step of a border have a bias of their own size,
