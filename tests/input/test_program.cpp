@@ -62,6 +62,21 @@ TEST_F(Program, RendersAndDifferentiates) {
   EXPECT_EQ(run("info " + scene_).status, 0);
 }
 
+// The image is that of a run by samples.
+TEST_F(Program, ImagesTakeALimitOfTime) {
+  const std::string figures = files_.path("timed.json");
+  const std::string render = "render " + scene_ + " --quiet --seed 3 --json " + figures + " -o ";
+  EXPECT_EQ(run(render + out() + " --time 0.05").status, 0);
+  const int spp = nlohmann::json::parse(std::ifstream(figures))["spp"];
+  EXPECT_GE(spp, 1);
+  const std::string other = files_.path("counted.exr");
+  EXPECT_EQ(run(render + other + " --spp " + std::to_string(spp)).status, 0);
+  EXPECT_EQ(read_exr(out()).data, read_exr(other).data);
+  EXPECT_NE(
+      refused("render " + scene_ + " --time 1 --spp 4 -o " + out()).find("--spp excludes --time"),
+      std::string::npos);
+}
+
 TEST_F(Program, DifferentiatesForATime) {
   const std::string figures = files_.path("figures.json");
   const Outcome outcome = run("gradient " + scene_ + " --time 0.01 --quiet --wrt " +

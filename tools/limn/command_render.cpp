@@ -33,8 +33,11 @@ class RenderCommand final : public Command {
                    "layers of one file, with commas: " +
                        limn::join(layer_names()))
         ->capture_default_str();
+    add_time_option(app, common_);
     add_debug_option(app, debug_);
+    app.get_option("--debug-sample")->excludes("--time");
     add_part_option(app, common_);
+    app.get_option("--part")->excludes("--time");
   }
   bool join(BatchStore& store) override {
     common_.run.store = &store;
@@ -69,7 +72,9 @@ class RenderCommand final : public Command {
     }
     warnings_.add_all(result.warnings);
     write(scene, settings, result);
-    return finish_status(result.non_finite, result.spp, settings.spp, command_line);
+    const bool timed = settings.seconds > 0, all = timed && !settings.interrupted->load();
+    return finish_status(result.non_finite, result.spp, all ? result.spp : settings.spp,
+                         timed ? "" : command_line);
   }
 
  private:
@@ -87,9 +92,10 @@ class RenderCommand final : public Command {
       if (std::find(layers.begin(), layers.end(), name) != layers.end()) continue;
       throw InputError("--what: " + unknown_name("word", name, known));
     }
-    refuse_options(*app_,
-                   {"--method", "--generator", "--film", "--points", "--part", "--debug-sample"},
-                   "not for layers (--what)");
+    refuse_options(
+        *app_,
+        {"--method", "--generator", "--film", "--points", "--part", "--debug-sample", "--time"},
+        "not for layers (--what)");
     return true;
   }
   static std::vector<std::string> split_names(const std::string& text) {
@@ -120,7 +126,7 @@ class RenderCommand final : public Command {
   }
   void check_options() const {
     check_image_options(*app_, {options_.method});
-    refuse_samples(*app_, options_.points, {"--spp", "--part"}, options_);
+    refuse_samples(*app_, options_.points, {"--spp", "--time", "--part"}, options_);
     if (!has_generator() && options_.points == FilmPoints::kRandom) {
       refuse_options(*app_, {"--generator"},
                      fmt::format("the method {} has its own", options_.method.name()));
