@@ -35,7 +35,7 @@ constexpr double kKept = 0.5;
 // What a choice must leave of squared error x work to be preferred to the usual numbers: where a
 // lattice before a sky promised 0.59 to 0.72 on average, one of five motions got 1.2 to 2.6.
 constexpr double kConvincing = 0.5;
-// The edges that `forest` draws before lights have rare and large samples, most of which a pilot
+// The edges that `forest` draws have rare and large samples, most of which a pilot
 // misses; listed silhouettes have none. So their variance is taken to be so many times what the
 // pilot finds: in gloss and beside a lamp of 1,886 faces, without it, one of two adjoints got
 // `forest`, and 7 to 23 times the squared error x time.
@@ -323,6 +323,7 @@ class Pilot {
   ReversePlan plan() {
     if (!looks_) return {std::move(candidates_[0].estimator), ""};
     for (Candidate& candidate : candidates_) measure(candidate);
+    if (candidates_.size() > 1) raise_unseen();
     const std::vector<double> units = candidates_[0].errors(candidates_[0].usual());
     const double usual = candidates_[0].product(candidates_[0].usual(), units);
     Candidate* chosen = &candidates_[0];
@@ -376,7 +377,7 @@ class Pilot {
   }
   // Terms that no vertex has part in are the same in all.
   void measure(Candidate& candidate) {
-    const bool misses = candidates_.size() > 1 && &candidate == &candidates_[0];
+    const bool misses = &candidate == &candidates_[0];
     ReverseEstimator& estimator = *candidate.estimator;
     for (size_t slot = 0; slot < estimator.slots(); ++slot) {
       candidate.figures.emplace_back();
@@ -388,6 +389,20 @@ class Pilot {
         for (double& v : candidate.figures.back().variances) v *= kUnseen;
       if (!estimator.draws_at_vertices(slot))
         alike_[estimator.slot_name(slot)] = candidate.figures.back();
+    }
+  }
+
+  // Draws vary at least as much as what lists have in their place: between slats and a lamp 1,024
+  // paths may meet none of the draws that matter.
+  void raise_unseen() {
+    for (ReverseFigures& drawn : candidates_[0].figures) {
+      if (!drawn.at_vertices) continue;
+      for (size_t d = 0; d < drawn.variances.size(); ++d) {
+        double listed = 0;
+        for (const ReverseFigures& figures : candidates_[1].figures)
+          if (figures.at_vertices) listed += figures.variances[d];
+        drawn.variances[d] = std::max(drawn.variances[d], kUnseen * listed);
+      }
     }
   }
 
