@@ -19,7 +19,7 @@
 #include "integrators/terms/vertex_edges.h"
 #include "limn/core/error.h"
 #include "limn/core/exposure.h"
-#include "limn/integrators/options.h"
+#include "limn/integrators/fit_options.h"
 
 namespace limn {
 

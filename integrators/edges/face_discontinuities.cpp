@@ -21,7 +21,7 @@ using Part = std::array<Point, 3>;
 class CurvedFace {
  public:
   CurvedFace(const Texture& texture, const Mesh& mesh, FaceId face, size_t most,
-             Texture::Jumps& lines)
+             Texture::Discontinuities& lines)
       : texture_(texture), mesh_(mesh), face_(face), most_(most), lines_(lines) {
     angle_ = mesh.uv_source == UvSource::kSphere ? 0 : 1;
     turn_ = uv({1.0 / 3, 1.0 / 3})[angle_];
@@ -72,8 +72,9 @@ class CurvedFace {
     for (int k = 0; k < 3; ++k) middles[k] = at(middle(part[k].b, part[(k + 1) % 3].b));
     if (cuts < kMostCuts && off_lines(part, middles, cuts) > kOffCurve)
       return add_quarters(part, middles, cuts + 1);
-    Texture::Jumps found;
-    if (!texture_.add_jumps({part[0].uv, part[1].uv, part[2].uv}, most_, found)) return {};
+    Texture::Discontinuities found;
+    if (!texture_.add_discontinuities({part[0].uv, part[1].uv, part[2].uv}, most_, found))
+      return {};
     const auto on_face = [&](const Pair& at) {
       Pair b = part[0].b;
       for (int c = 0; c < 2; ++c) {
@@ -81,7 +82,7 @@ class CurvedFace {
       }
       return b;
     };
-    for (const Texture::Jump& line : found.inside) {
+    for (const Texture::Discontinuity& line : found.inside) {
       lines_.inside.push_back({on_face(line.from), on_face(line.to)});
     }
     if (lines_.inside.size() > most_) return {};
@@ -110,7 +111,7 @@ class CurvedFace {
   const Mesh& mesh_;
   FaceId face_;
   size_t most_;
-  Texture::Jumps& lines_;
+  Texture::Discontinuities& lines_;
   int angle_;
   double turn_;               // of the middle
   std::optional<Pair> pole_;  // a corner on the axis
@@ -119,7 +120,7 @@ class CurvedFace {
 }  // namespace
 
 bool add_face_discontinuities(const Texture& texture, const Mesh& mesh, FaceId face, size_t most,
-                              Texture::Jumps& lines) {
+                              Texture::Discontinuities& lines) {
   if (mesh.uv_source != UvSource::kPlane) return CurvedFace(texture, mesh, face, most, lines).add();
   const FaceIndices& ids = mesh.uv_ids[face.index()];
   std::array<Pair, 3> uv;
@@ -127,7 +128,7 @@ bool add_face_discontinuities(const Texture& texture, const Mesh& mesh, FaceId f
     const Vec3f& place = mesh.uv_places[ids[k]];
     uv[k] = {place.x, place.y};
   }
-  return texture.add_jumps(uv, most, lines);
+  return texture.add_discontinuities(uv, most, lines);
 }
 
 }  // namespace limn

@@ -28,13 +28,14 @@ bool is_near(const std::array<double, 2>& a, const std::array<double, 2>& b) {
 }
 
 // Lines that two textures have in common.
-void leave_out_copies(std::vector<Texture::Jump>& lines) {
-  std::vector<Texture::Jump> kept;
-  for (const Texture::Jump& line : lines) {
-    const bool known = std::any_of(kept.begin(), kept.end(), [&](const Texture::Jump& other) {
-      return (is_near(line.from, other.from) && is_near(line.to, other.to)) ||
-             (is_near(line.from, other.to) && is_near(line.to, other.from));
-    });
+void leave_out_copies(std::vector<Texture::Discontinuity>& lines) {
+  std::vector<Texture::Discontinuity> kept;
+  for (const Texture::Discontinuity& line : lines) {
+    const bool known =
+        std::any_of(kept.begin(), kept.end(), [&](const Texture::Discontinuity& other) {
+          return (is_near(line.from, other.from) && is_near(line.to, other.to)) ||
+                 (is_near(line.from, other.to) && is_near(line.to, other.from));
+        });
     if (!known) kept.push_back(line);
   }
   lines = std::move(kept);
@@ -72,7 +73,7 @@ void TextureDiscontinuities::look_at(const Scene& scene, ShapeId id) {
   std::vector<const Texture*> textures;
   seams.period_one = true;
   for (const Texture* texture : textures_of(shape)) {
-    seams.everywhere = seams.everywhere || texture->jumps_between_faces();
+    seams.everywhere = seams.everywhere || texture->discontinuous_between_faces();
     if (!texture->needs_uv()) {
       mark_copies(mesh, seams);
       continue;
@@ -95,7 +96,7 @@ void TextureDiscontinuities::look_at(const Scene& scene, ShapeId id) {
 
 bool TextureDiscontinuities::add_face(const std::vector<const Texture*>& textures, const Mesh& mesh,
                                       FaceId face, OfShape& result) {
-  Texture::Jumps lines;
+  Texture::Discontinuities lines;
   size_t of_one = 0;  // how many textures are discontinuous
   for (const Texture* texture : textures) {
     const size_t before = lines.inside.size();
@@ -107,7 +108,7 @@ bool TextureDiscontinuities::add_face(const std::vector<const Texture*>& texture
   }
   if (of_one > 1) leave_out_copies(lines.inside);
   result.seams.sides[face.index()] |= lines.sides;
-  for (const Texture::Jump& line : lines.inside) {
+  for (const Texture::Discontinuity& line : lines.inside) {
     result.segments.push_back({face, line.from, line.to});
   }
   count_ += lines.inside.size();

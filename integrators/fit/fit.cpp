@@ -14,8 +14,8 @@
 #include "limn/core/error.h"
 #include "limn/core/exposure.h"
 #include "limn/core/rng.h"
+#include "limn/integrators/fit_options.h"
 #include "limn/integrators/methods.h"
-#include "limn/integrators/options.h"
 #include "limn/integrators/remesh.h"
 
 namespace limn {

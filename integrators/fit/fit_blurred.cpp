@@ -60,12 +60,12 @@ void Fit::Impl::check_blur() const {
         "\"{}\" is an array: a fit that begins blurred takes scalars and colours", p.name()));
   }
   for (size_t v = 0; v < views.size(); ++v) {
-    check_blurred(flat(views[v].scene));
     std::vector<Parameter> own;
     for (const FitParameter& p : parameters_) {
       if (p.in_view(v)) own.push_back(*p.in_view(v));
     }
     check_still(views[v].scene, "a fit that begins blurred", own);
+    check_blurred(flat(views[v].scene));
   }
 }
 

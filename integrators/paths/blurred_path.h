@@ -14,7 +14,7 @@
 #include <type_traits>
 #include <vector>
 
-#include "integrators/paths/blurred_scene.h"
+#include "integrators/paths/blurred_hits.h"
 #include "integrators/paths/path_colours.h"
 #include "integrators/paths/path_context.h"
 #include "integrators/paths/path_directions.h"
@@ -25,21 +25,16 @@
 namespace limn {
 
 template <class S>
-struct BlurredRay {
-  Vec3<S> origin, direction;
-  double t_min = 0, t_max = std::numeric_limits<double>::infinity();
-  FaceRef start = {};
-  int bounces = 0;         // before it
-  double pdf = 0;          // of its direction [1/sr]; 0 of the camera's
-  Lights::Point lights{};  // where it starts
-};
-
-template <class S>
 class BlurredPath {
  public:
   // lane_scale: natural steps of the lanes' parameters.
   BlurredPath(const BlurredScene& scene, const Rng& key, const Lanes& lane_scale, RayCount& rays)
-      : s_(scene), scene_(scene.scene()), key_(key), lane_scale_(lane_scale), rays_(rays) {}
+      : s_(scene),
+        scene_(scene.scene()),
+        key_(key),
+        lane_scale_(lane_scale),
+        rays_(rays),
+        hits_(scene, rays) {}
 
   // Radiance that arrives against the ray.
   Rgb<S> arriving(const BlurredRay<S>& ray) {
@@ -63,83 +58,21 @@ class BlurredPath {
   static constexpr bool kPlain = std::is_same_v<S, double>;
   bool ordered() const { return s_.blur().weights == BlurWeights::kOrdered; }
 
-  // Sets hits_ and weights_; the last weight is that of what is behind. Returns their number.
-  size_t look(const BlurredRay<S>& ray) {
-    Ray primal{value(ray.origin), value(ray.direction), ray.t_min, ray.t_max, ray.start};
-    primal.skip_emitters = scene_.hide_emitters && ray.bounces == 0;
-    s_.tracer().hits(primal, found_);
-    if (found_.size() == 1 && found_[0].opacity == 1) {
-      weights_.assign({S(1.0), S(0.0)});
-      hits_.assign({{found_[0].face, found_[0].t, 1.0, found_[0].front}});
-      return 2;
-    }
-    hits_.clear();
-    for (const BlurHit& hit : found_) hits_.push_back(lifted(ray, hit));
-    blur_weights<S>(hits_, s_.blur(), s_.far(ray.bounces), neighbours(), weights_);
-    S rest = 1.0;
-    for (const S& w : weights_) rest = rest - w;
-    weights_.push_back(detail::not_negative(rest));
-    return weights_.size();
-  }
-  auto neighbours() const {
-    return [this](const BlurredFace<S>& a, const BlurredFace<S>& b) {
-      return a.front == b.front && s_.faces().touch(a.face, b.face);
-    };
-  }
-  // The hit as it moves.
-  BlurredFace<S> lifted(const BlurredRay<S>& ray, const BlurHit& hit) const {
-    if constexpr (!kPlain) {
-      const Mesh& mesh = scene_.shape(hit.face.shape).mesh;
-      const bool held = is_constant(ray.origin) && is_constant(ray.direction);
-      if (!held || !mesh.position_tangents.empty()) {
-        const auto corners = face_corners<S>(mesh, hit.face.face);
-        const Vec3<S> n = cross(corners[1] - corners[0], corners[2] - corners[0]);
-        const S t = dot(corners[0] - ray.origin, n) / dot(n, ray.direction);
-        const S d = distance_to_sides(corners, ray.origin + ray.direction * t);
-        return {hit.face, t, blur_opacity(d, s_.blur().sigma), hit.front};
-      }
-    }
-    return {hit.face, hit.t, hit.opacity, hit.front};
-  }
-
-  // Draws one of the surfaces that the ray meets by its weight.
+  // Draws one of the surfaces that the ray meets, and traces another, too.
   Face draw() {
-    ++rays_.closest;
-    const size_t met = look(ray_);
     Rng rng = key_.at(Purpose::kEdgeSide, ray_.bounces);
-    double u = rng.uniform();
-    size_t k = 0;
-    while (k + 1 < met && u >= value(weights_[k])) u -= value(weights_[k++]);
+    const size_t k = hits_.draw(ray_, rng.uniform());
     if constexpr (!kPlain) pair_with(k);
-    return k < hits_.size() ? Face(hits_[k].face) : Face();
+    return hits_.face(k);
   }
-
-  // Traces another surface that the ray met than the drawn one, k.
   void pair_with(size_t k) {
-    constexpr double kSmall = 0.05;  // changes of weight below it are left to roulette; not tuned
-    std::vector<double> shares(weights_.size());
-    double sum = 0;
-    for (size_t j = 0; j < weights_.size(); ++j) {
-      for (int l = 0; j != k && l < kLanes; ++l) {
-        shares[j] += std::fabs(weights_[j].d[l] * lane_scale_[l]);
-      }
-      sum += shares[j];
-    }
-    if (!(sum > 0)) return;
-    Rng rng = key_.at(Purpose::kDirect, ray_.bounces);
-    const double survival = std::min(1.0, sum / kSmall);
-    if (rng.uniform() >= survival) return;
-    double u = rng.uniform() * sum;
-    size_t j = 0;
-    while (j + 1 < shares.size() && (u >= shares[j] || shares[j] == 0)) u -= shares[j++];
-    if (shares[j] == 0) return;  // rounding
+    const auto drawn = hits_.draw_other(k, lane_scale_, key_.at(Purpose::kDirect, ray_.bounces));
+    if (!drawn) return;
     const BlurredRay<double> ray{value(ray_.origin), value(ray_.direction), 0,        ray_.t_max,
                                  ray_.start,         ray_.bounces,          ray_.pdf, ray_.lights};
     BlurredPath<double> path(s_, key_, lane_scale_, rays_);
-    const Rgb<double> other =
-        path.leaving(ray, j < hits_.size() ? Face(hits_[j].face) : Face(), albedo_);
-    pairs_.push_back(
-        {weights_[j].d * (sum / (shares[j] * survival)), value(throughput_) * other, value(sum_)});
+    const Rgb<double> other = path.leaving(ray, hits_.face(drawn->j), albedo_);
+    pairs_.push_back({drawn->weight, value(throughput_) * other, value(sum_)});
   }
 
   // The path from the end of ray_.
@@ -225,26 +158,6 @@ class BlurredPath {
     return !last || (ordered() && (s_.lights().on_shapes() || scene_.environment));
   }
 
-  // What is not hidden of a face, or of what is behind the ray's end if there is none.
-  S unhidden(const BlurredRay<S>& ray, const Face& face) {
-    ++rays_.shadow;
-    const size_t met = look(ray);
-    if (ordered()) {
-      if (!face) return weights_[met - 1];
-      for (size_t k = 0; k < hits_.size(); ++k) {
-        if (hits_[k].face == *face) return weights_[k];
-      }
-      return 0.0;
-    }
-    // Quinn 2021, 4.4, but that lamps fade, too: where directions are held, ends would be missing.
-    S result = 1.0;
-    for (const BlurredFace<S>& hit : hits_) {
-      if (face && hit.face == *face) return result * hit.opacity;
-      if (!face || !s_.faces().touch(hit.face, *face)) result = result * (1.0 - hit.opacity);
-    }
-    return face ? S(0.0) : result;
-  }
-
   // Light that is scattered once from a light that is drawn. ray: from the surface.
   Rgb<S> direct(BlurredRay<S> ray, const Scattering<S>& scattering) {
     if (s_.lights().empty()) return {};
@@ -258,13 +171,13 @@ class BlurredPath {
       if (detail::stays_black(f)) return {};
       ray.direction = arriving->wo;
       ray.t_max = light->distance;
-      return f * arriving->irradiance * unhidden(ray, {}) * (1 / light->pdf);
+      return f * arriving->irradiance * hits_.unhidden(ray, {}) * (1 / light->pdf);
     }
     const auto [f, pdf] = scattering.eval_with_pdf(light->wo);
     if (detail::stays_black(f)) return {};
     ray.direction = detail::moving<S>(light->wo, nullptr);
     const Face face = light->face ? Face(s_.emitters().face(*light->face)) : Face();
-    const S seen = unhidden(ray, face);
+    const S seen = hits_.unhidden(ray, face);
     const double weight = ordered() ? mis_weight_over_pdf(light->pdf, pdf) : 1 / light->pdf;
     return f * light->light->template drawn_radiance<S>(*light) * seen * weight;
   }
@@ -277,9 +190,7 @@ class BlurredPath {
   BlurredRay<S> ray_;
   Rgb<S> throughput_ = grey(S(1.0)), sum_;
   double albedo_ = 1;
-  std::vector<BlurHit> found_;
-  std::vector<BlurredFace<S>> hits_;
-  std::vector<S> weights_;
+  BlurredHits<S> hits_;
   std::vector<Pair> pairs_;
 };
 

@@ -32,11 +32,12 @@ bool has_texel_borders(const Scene& scene) {
   for (const Shape& shape : scene.shapes) {
     for (int k = 0; k < shape.bsdf->texture_count(); ++k) {
       const Texture& texture = shape.bsdf->texture(k);
-      if (texture.jumps_between_texels() && texture.jumps_between_faces()) return true;
+      if (texture.discontinuous_between_texels() && texture.discontinuous_between_faces())
+        return true;
     }
   }
   return std::any_of(scene.delta_lights.begin(), scene.delta_lights.end(), [](const auto& light) {
-    return light->texture() && light->texture()->jumps_between_texels();
+    return light->texture() && light->texture()->discontinuous_between_texels();
   });
 }
 

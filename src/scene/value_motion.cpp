@@ -143,7 +143,7 @@ void add_emitter_parameters(const Scene& scene, std::vector<Parameter>& list) {
     const auto owner = [i](Scene& copy) { return copy.delta_lights[i]; };
     std::vector<ParameterRef> values = light.parameters();
     // Of what moves the borders of texels only the power, which comes first, is left.
-    if (light.texture() && light.texture()->jumps_between_texels()) values.resize(1);
+    if (light.texture() && light.texture()->discontinuous_between_texels()) values.resize(1);
     add_values(light.id, values, owner, list, &light, scene_size(scene));
   }
 }

@@ -84,10 +84,10 @@ class Bitmap final : public Texture {
   }
   Rgb<double> mean() const override { return of_use(texels_->mean()); }
   Range range() const override { return {texels_->least(), texels_->most()}; }
-  bool jumps_between_texels() const override { return settings_.nearest; }
+  bool discontinuous_between_texels() const override { return settings_.nearest; }
   // Borders of texels. Where both sides have one value, radiance is continuous.
-  bool add_jumps(const std::array<std::array<double, 2>, 3>& uv, size_t most,
-                 Jumps& lines) const override {
+  bool add_discontinuities(const std::array<std::array<double, 2>, 3>& uv, size_t most,
+                           Discontinuities& lines) const override {
     if (!settings_.nearest) return true;
     return add_grid_lines(uv, settings_.to_uv, {texels_->width(), texels_->height()}, most, lines);
   }

@@ -42,8 +42,8 @@ class Checkerboard final : public Texture {
     }
     return range;
   }
-  bool add_jumps(const std::array<std::array<double, 2>, 3>& uv, size_t most,
-                 Jumps& lines) const override {
+  bool add_discontinuities(const std::array<std::array<double, 2>, 3>& uv, size_t most,
+                           Discontinuities& lines) const override {
     return add_grid_lines(uv, to_uv_, {2, 2}, most, lines);
   }
   bool has_period_one() const override { return to_uv_.keeps_integers(); }

@@ -8,7 +8,7 @@ namespace limn {
 namespace {
 
 // Where t, linear over the face from these values at its corners, is `level`, between two of them.
-Texture::Jump line_at(const std::array<double, 3>& t, double level) {
+Texture::Discontinuity line_at(const std::array<double, 3>& t, double level) {
   std::array<std::array<double, 2>, 2> ends{};
   int count = 0;
   for (int k = 0; k < 3 && count < 2; ++k) {
@@ -23,7 +23,7 @@ Texture::Jump line_at(const std::array<double, 3>& t, double level) {
 }
 
 // Where it is a whole number.
-bool add_lines(const std::array<double, 3>& t, size_t most, Texture::Jumps& lines) {
+bool add_lines(const std::array<double, 3>& t, size_t most, Texture::Discontinuities& lines) {
   const auto [least, greatest] = std::minmax({t[0], t[1], t[2]});
   // Lines so near to a side or corner are along it: texture coordinates are rounded to floats.
   const double near = 0x1p-24 * (greatest - least);
@@ -42,7 +42,8 @@ bool add_lines(const std::array<double, 3>& t, size_t most, Texture::Jumps& line
 }  // namespace
 
 bool add_grid_lines(const std::array<std::array<double, 2>, 3>& uv, const UvTransform& to_uv,
-                    const std::array<int, 2>& per_unit, size_t most, Texture::Jumps& lines) {
+                    const std::array<int, 2>& per_unit, size_t most,
+                    Texture::Discontinuities& lines) {
   std::array<std::array<double, 3>, 2> t;
   for (int k = 0; k < 3; ++k) {
     const std::array<double, 2> at = to_uv(uv[k]);

@@ -128,7 +128,7 @@ class AttributeTexture final : public Texture {
   Rgb<double> mean() const override { return grey(0.5 * std::min(valid_.most, 1.0)); }
   Range range() const override { return valid_; }
   bool needs_uv() const override { return false; }
-  bool jumps_between_faces() const override { return name_.starts_with("face_"); }
+  bool discontinuous_between_faces() const override { return name_.starts_with("face_"); }
   std::string attribute() const override { return name_; }
   double attribute_scale() const override { return scale_; }
   const TexelMap& texels_on(const Mesh& mesh) const override { return attribute_of(mesh, name_); }

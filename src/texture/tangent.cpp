@@ -207,8 +207,10 @@ class SurfaceGradient final : public OfFace {
   bool needs_uv() const override { return heights_->needs_uv(); }
   std::string attribute() const override { return heights_->attribute(); }
   double attribute_scale() const override { return heights_->attribute_scale(); }
-  bool jumps_between_texels() const override { return heights_->jumps_between_texels(); }
-  bool jumps_between_faces() const override { return true; }
+  bool discontinuous_between_texels() const override {
+    return heights_->discontinuous_between_texels();
+  }
+  bool discontinuous_between_faces() const override { return true; }
   bool has_period_one() const override { return heights_->has_period_one(); }
   std::shared_ptr<Texture> clone() const override {
     return std::make_shared<SurfaceGradient>(heights_->clone());

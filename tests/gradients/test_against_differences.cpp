@@ -119,7 +119,7 @@ TEST_P(CoarseBall, AgreesByDefault) {
   expect_agreement(make(files), "ball.rotate.z", 512);
 }
 
-TEST_P(CoarseBall, DisagreesWhereShadingJumps) {
+TEST_P(CoarseBall, DisagreesWhereShadingIsDiscontinuous) {
   const TempFiles files;
   Scene scene = make(files);
   scene.shading = ShadingModel::kMitsuba;

@@ -4,13 +4,17 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
+#include <map>
 
 #include "limn/core/error.h"
 #include "limn/core/parameter.h"
+#include "limn/core/rng.h"
 #include "limn/integrators/fit.h"
 #include "limn/integrators/gradient.h"
 #include "limn/integrators/render.h"
 #include "support/meshes.h"
+#include "support/motion_scenes.h"
 #include "support/scenes.h"
 
 namespace limn {
@@ -149,7 +153,92 @@ TEST(BlurredFit, ChannelsOfColoursMayMix) {
   const std::vector<double> parted = first_step({name + ".r", name + ".g", name + ".b"});
   for (size_t c = 0; c < 3; ++c) {
     EXPECT_NE(whole[c], find_parameter(scene, name).value(scene)[c]);
-    EXPECT_NEAR(whole[c], parted[c], 1e-12);
+    EXPECT_DOUBLE_EQ(whole[c], parted[c]);
+  }
+}
+
+// More numbers than one pass has derivatives of, two views with films, masks and parameters of
+// their own: what loss and derivative images of the same samples give.
+TEST(BlurredFit, AddsPassesAndViews) {
+  const TempFiles files;
+  const auto view_of = [&](double height, const std::string& film, const std::string& colour,
+                           float weight) {
+    SceneParts parts;
+    parts.max_depth = 2;
+    parts.origin = {0, height, 3};
+    parts.target = {0, 0, 0};
+    parts.width = 6;
+    parts.height = 5;
+    parts.film = R"(<rfilter type="box"/>)" + film;
+    parts.body = square("floor", 3, -90, {0, 0, 0}, diffuse("grey", ".7, .5, .3")) +
+                 obj_shape("box", write_mesh(files, "box.obj", cube_mesh()), true, 0.25,
+                           {0.3, 1, 0}, diffuse(colour, ".7")) +
+                 square("lamp", 0.3, 90, {0, 4, 0}, area_light("glow", "30"));
+    FitView view{make_scene(files, parts), {}, {}};
+    const Film& f = view.scene.film;
+    view.target = Image(f.crop_width, f.crop_height, 3);
+    view.mask = Image(f.crop_width, f.crop_height, 1);
+    for (size_t i = 0; i < view.mask.data.size(); ++i) {
+      view.mask.data[i] = weight * static_cast<float>(i % 3);
+    }
+    return view;
+  };
+  const std::vector<FitView> views{
+      view_of(1.2, "", "white", 1),
+      view_of(2.4,
+              R"(<integer name="crop_offset_x" value="1"/><integer name="crop_width" value="4"/>
+                      <integer name="crop_offset_y" value="2"/><integer name="crop_height" value="3"/>)",
+              "other", 0.5f)};
+  FitOptions options = options_of({"box.translate.x", "box.translate.y", "grey.reflectance",
+                                   "white.reflectance", "glow.radiance"},
+                                  0.03, 1);
+  options.optimiser = OptimiserKind::kGradientDescent;
+  options.step = 1e-3;
+  const RunSettings settings = settings_of(4, 3);
+
+  // By the name of each number; both add up less than 4 x 90 numbers, in another order.
+  std::map<std::string, double> slopes, rounding;
+  for (size_t v = 0; v < views.size(); ++v) {
+    RunSettings own = settings;
+    own.seed = mix_bits(mix_bits(mix_bits(settings.seed)) + v);
+    const LossResult loss = image_loss(views[v].scene, views[v].target, {}, own, views[v].mask);
+    GradientOptions derived;
+    derived.method = Method("blurred");
+    derived.blur = options.blur;
+    derived.parameters = {"box.translate.x", "box.translate.y"};
+    for (const char* colour : {"grey.reflectance", "white.reflectance", "glow.radiance"}) {
+      if (v == 1 && colour[0] == 'w') continue;
+      for (const char* channel : {".r", ".g", ".b"}) {
+        derived.parameters.push_back(std::string(colour) + channel);
+      }
+    }
+    const GradientResult found = limn::gradient(views[v].scene, derived, own);
+    for (const ParameterGradient& g : found.parameters) {
+      double sum = 0;
+      for (size_t i = 0; i < g.total.size(); ++i) {
+        const double part = g.total.mean(i) * static_cast<double>(0.5f * loss.adjoint.data[i]);
+        sum += part;
+        rounding[g.name] += 360 * std::numeric_limits<double>::epsilon() * std::fabs(part);
+      }
+      EXPECT_NE(sum, 0) << g.name;
+      slopes[g.name] += sum;
+    }
+  }
+
+  Fit fit(views, options, settings);
+  const std::vector<FitScalar> before = fit.scalars();
+  const FitRecord record = fit.step().value();
+  ASSERT_EQ(before.size(), 11u);
+  ASSERT_EQ(slopes.size(), 11u);
+  for (size_t k = 0; k < before.size(); ++k) {
+    const double unit = find_parameter(views[0].scene, before[k].parameter).natural_step;
+    const double scale = options.step * unit * unit;
+    const double expected = before[k].value - scale * slopes.at(before[k].name);
+    EXPECT_NE(record.values[k], before[k].value) << before[k].name;
+    EXPECT_NEAR(record.values[k], expected,
+                scale * rounding.at(before[k].name) +
+                    2 * std::numeric_limits<double>::epsilon() * std::fabs(before[k].value))
+        << before[k].name;
   }
 }
 
@@ -233,6 +322,29 @@ TEST(BlurredFit, RefusesWhatItCannotTake) {
   options = options_of(x, 0.1, 3);
   options.backward.terms = {"camera"};
   tells(options, "leave out `terms`");
+
+  // Of the scene: the message names the fit, not a method that nobody named.
+  const auto refusal = [&](const std::string& bsdf, const std::string& parameter) -> std::string {
+    SceneParts parts;
+    parts.width = parts.height = 4;
+    parts.body = square("floor", 3, -90, {0, 0, 0}, bsdf) +
+                 square("lamp", 0.3, 90, {0, 4, 0}, area_light("glow", "30"));
+    const Scene of_text = scene_of_text(with_shutter(parts, 0, 1));
+    try {
+      Fit({{of_text, Image(4, 4, 3), {}}}, options_of({parameter}, 0.1, 3), settings_of(1, 0));
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  const std::string checks =
+      refusal(R"(<bsdf type="diffuse"><texture type="checkerboard" name="reflectance"/></bsdf>)",
+              "glow.radiance");
+  EXPECT_NE(checks.find("blurred faces do not support textures"), std::string::npos) << checks;
+  const std::string moving = refusal(diffuse("grey", ".5"), "floor.velocity.x");
+  EXPECT_NE(moving.find("a fit that begins blurred cannot take a scene in which something moves"),
+            std::string::npos)
+      << moving;
 }
 
 }  // namespace

@@ -394,6 +394,42 @@ TEST(FilmFlow, TellsWhereTexturesMove) {
   EXPECT_FALSE(moves_textures(estimator_of(plain, "ball.translate.x")->scene()));
 }
 
+// A finer grid leaves every pixel what it had; one whose cells are no parts of the others takes the
+// plan of a cell's first pixel.
+TEST(FilmFlow, RefinesPlans) {
+  const TempFiles files;
+  const Scene scene = card_scene(files, 24);
+  const auto grid_of = [&](int cell) {
+    PlanGrid grid;
+    grid.x0 = scene.film.crop_x;
+    grid.y0 = scene.film.crop_y;
+    grid.cell = cell;
+    grid.columns = grid.rows = (24 + cell - 1) / cell;
+    return grid;
+  };
+  for (const int cell : {2, 3}) {
+    SamplePlan plan;
+    plan.grid = grid_of(4);
+    plan.counts.resize(plan.grid.size());
+    for (size_t c = 0; c < plan.grid.size(); ++c) {
+      plan.counts[c][1] = static_cast<float>(c + 1);
+    }
+    SamplePlan finer = plan;
+    refine(finer, grid_of(cell));
+    EXPECT_TRUE(finer.fields.empty());
+    ASSERT_EQ(finer.counts.size(), grid_of(cell).size());
+    for (int y = 0; y < 24; ++y) {
+      for (int x = 0; x < 24; ++x) {
+        const int first_x = x - x % cell, first_y = y - y % cell;
+        const auto& grid = finer.grid;
+        EXPECT_EQ(finer.counts[grid.index(x + grid.x0, y + grid.y0)],
+                  plan.counts[plan.grid.index(first_x + grid.x0, first_y + grid.y0)])
+            << cell << ", " << x << ", " << y;
+      }
+    }
+  }
+}
+
 // Texture finer than a pixel slides: samples of few pixels find which motion follows it, and each
 // pixel has its own.
 TEST(FilmFlow, IsChosenWhereItFits) {

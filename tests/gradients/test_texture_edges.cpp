@@ -34,11 +34,11 @@ std::shared_ptr<Texture> checkerboard(const Matrix4& to_uv = {}) {
 bool on_left(const Place& a, const Place& b, const Place& x) {
   return (b[0] - a[0]) * (x[1] - a[1]) - (b[1] - a[1]) * (x[0] - a[0]) > 0;
 }
-bool cross(const Texture::Jump& line, const Place& a, const Place& b) {
+bool cross(const Texture::Discontinuity& line, const Place& a, const Place& b) {
   return on_left(line.from, line.to, a) != on_left(line.from, line.to, b) &&
          on_left(a, b, line.from) != on_left(a, b, line.to);
 }
-bool is_near(const Texture::Jump& line, const Place& x) {
+bool is_near(const Texture::Discontinuity& line, const Place& x) {
   const double dx = line.to[0] - line.from[0], dy = line.to[1] - line.from[1];
   const double across = (x[0] - line.from[0]) * dy - (x[1] - line.from[1]) * dx;
   return std::fabs(across) <= 2 * kOffCurve * std::hypot(dx, dy);
@@ -53,8 +53,8 @@ bool is_by_axis(const Mesh& mesh, FaceId face, const Place& b) {
   return std::hypot(place.x, place.y) < 1.0 / 16;
 }
 
-Texture::Jumps lines_of(const Texture& texture, const Mesh& mesh, FaceId face) {
-  Texture::Jumps lines;
+Texture::Discontinuities lines_of(const Texture& texture, const Mesh& mesh, FaceId face) {
+  Texture::Discontinuities lines;
   EXPECT_TRUE(add_face_discontinuities(texture, mesh, face, 1000, lines));
   return lines;
 }
@@ -63,7 +63,7 @@ Texture::Jumps lines_of(const Texture& texture, const Mesh& mesh, FaceId face) {
 // segments that stand for curves are too near to tell.
 int expect_discontinuities_at_segments(const Texture& texture, const Mesh& mesh, FaceId face,
                                        Rng& rng) {
-  const Texture::Jumps lines = lines_of(texture, mesh, face);
+  const Texture::Discontinuities lines = lines_of(texture, mesh, face);
   const auto draw = [&] {
     const double u = std::sqrt(rng.uniform()), v = rng.uniform();
     return Place{u * v, u * (1 - v)};
@@ -73,7 +73,7 @@ int expect_discontinuities_at_segments(const Texture& texture, const Mesh& mesh,
     const Place a = draw(), b = draw();
     size_t count = 0;
     bool near = is_by_axis(mesh, face, a) || is_by_axis(mesh, face, b);
-    for (const Texture::Jump& line : lines.inside) {
+    for (const Texture::Discontinuity& line : lines.inside) {
       count += cross(line, a, b);
       near = near || is_near(line, a) || is_near(line, b);
     }
@@ -159,18 +159,19 @@ TEST(FaceDiscontinuities, AreCurvesOnSpheresAndDisks) {
 
 TEST(Checkerboard, LinesAlongSidesAreNotInside) {
   const auto texture = checkerboard();
-  Texture::Jumps lines;
-  ASSERT_TRUE(texture->add_jumps({{{0, 0.25}, {0.5, 0.25}, {0.5, 0.75}}}, 10, lines));
+  Texture::Discontinuities lines;
+  ASSERT_TRUE(texture->add_discontinuities({{{0, 0.25}, {0.5, 0.25}, {0.5, 0.75}}}, 10, lines));
   EXPECT_EQ(lines.sides, 2);           // u = 1/2 from the second corner to the third
   ASSERT_EQ(lines.inside.size(), 1u);  // v = 1/2
-  EXPECT_FALSE(texture->add_jumps({{{0, 0}, {9, 0}, {9, 9}}}, 10, lines));
+  EXPECT_FALSE(texture->add_discontinuities({{{0, 0}, {9, 0}, {9, 9}}}, 10, lines));
   EXPECT_TRUE(texture->has_period_one());
   EXPECT_FALSE(checkerboard(turned_uv())->has_period_one());
   // Coordinates of files are floats: one tenth is none.
   Matrix4 five;
   five.m[0][0] = 5;
   lines = {};
-  ASSERT_TRUE(checkerboard(five)->add_jumps({{{0, 0.25}, {0.1f, 0.25}, {0.1f, 0.3}}}, 10, lines));
+  ASSERT_TRUE(
+      checkerboard(five)->add_discontinuities({{{0, 0.25}, {0.1f, 0.25}, {0.1f, 0.3}}}, 10, lines));
   EXPECT_EQ(lines.sides, 2);
   EXPECT_TRUE(lines.inside.empty());
 }

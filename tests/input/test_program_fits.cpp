@@ -233,6 +233,21 @@ TEST_F(Program, FitsOfLaterViewsAndFields) {
   }
 }
 
+TEST_F(Program, WarnsOfFitsWithoutAnExactStep) {
+  const std::string target = files_.path("target.exr");
+  ASSERT_EQ(run("render " + scene_ + " --spp 1 -o " + target).status, 0);
+  const std::string fit = "fit " + scene_ + " --target " + target +
+                          " --wrt blaze.radiance --spp 1 --sigma 0.01 --no-report --blur-steps 2 ";
+  const std::string warning =
+      "--blur-steps 2: the fit ends after 2 steps, before its first with exact derivatives";
+  const Outcome blurred = run(fit + "--steps 2 -o " + files_.path("blurred"));
+  EXPECT_EQ(blurred.status, 0) << blurred.text;
+  EXPECT_NE(blurred.text.find(warning), std::string::npos) << blurred.text;
+  const Outcome exact = run(fit + "--steps 3 -o " + files_.path("exact"));
+  EXPECT_EQ(exact.status, 0) << exact.text;
+  EXPECT_EQ(exact.text.find("--blur-steps"), std::string::npos) << exact.text;
+}
+
 // Who works in the folder is named, and what is there stays.
 TEST_F(Program, FitsOfTwoProcessesDoNotShareAFolder) {
   const std::string target = files_.path("target.exr"), folder = files_.path("fit");

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "limn/core/field_error.h"
+#include "limn/integrators/fit_options.h"
 #include "limn/integrators/options.h"
 
 namespace limn {

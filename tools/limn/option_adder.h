@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "limn/integrators/fit_options.h"
 #include "limn/integrators/options.h"
 
 namespace limn {

@@ -6,6 +6,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "limn/integrators/fit_options.h"
 #include "limn/integrators/options.h"
 #include "tools/python/bindings.h"
 

@@ -73,7 +73,7 @@ double median_side(const Scene& scene);
 
 // With what 0 stands for: sigma is then the square of a sixteenth of the median side, and gamma of
 // kPublished a sixteenth of the scene's diagonal, the least that it takes: where surfaces are
-// farther apart than about 16 gamma, what is in front would end where its opacity does, at a jump.
+// farther apart than about 16 gamma, what is in front would end at once where its opacity does.
 // InputError for less, and for a scene without faces.
 Blur resolved(Blur blur, const Scene& scene);
 

@@ -37,7 +37,7 @@ struct StoredImage {
   std::vector<uint8_t> bytes;  // one of the two is empty
   std::vector<float> floats;
 };
-// Reads EXR, PNG (8 and 16 bits), JPEG, RGBE (Radiance) or uncompressed BMP, told apart by their
+// Reads EXR, PNG (8 and 16 bits), JPEG, RGBE (Radiance) or uncompressed BMP, distinguished by their
 // first bytes, of at most kMaxPixels pixels. Alpha is dropped. Sizes in the header are checked
 // against the file's size before memory is allocated. InputError names the file.
 StoredImage read_stored_image(const std::string& file);

@@ -74,7 +74,7 @@ struct Mesh {
   std::vector<std::shared_ptr<MeshAttribute>> attributes;
   std::vector<uint32_t> file_faces;  // F: a face's index in the file; empty if its own
 
-  // Whether the shape's material asks for tangents (tangent.h). Where it does not, the next three
+  // Whether the shape's material needs tangents (tangent.h). Where it does not, the next three
   // are empty.
   bool has_tangents = false;
   std::vector<Vec3d> u_directions;      // sums of unit vectors along which u grows, times angles

@@ -18,7 +18,7 @@ namespace limn {
 class Bsdf;
 class Texture;
 
-// What a constant colour stands for where a number is asked for: its mean, as in Mitsuba (of a
+// What a constant colour stands for where a number is expected: its mean, as in Mitsuba (of a
 // bitmap it is the luminance).
 inline double number_of(const Rgb<double>& c) { return (c.r + c.g + c.b) / 3; }
 
@@ -61,7 +61,7 @@ class Properties {
     return number_of(rgb(name, grey(absent)));
   }
 
-  // The roughness that smooth lobes are asked to have; 0: they are smooth.
+  // The roughness that smooth lobes are given; 0: they are smooth.
   virtual double smooth_as() const { return 0; }
 
   // Throws an InputError at this element, or at one of its properties.

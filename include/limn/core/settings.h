@@ -1,6 +1,6 @@
 #pragma once
 // Rows of tables that leave choices open. A name may carry them: "forest:width=4:look-ahead=none"
-// asks for the row `forest` with two of its settings changed.
+// is the row `forest` with two of its settings changed.
 #include <initializer_list>
 #include <string>
 #include <vector>
@@ -43,7 +43,7 @@ class Settings {
 // The parts of "a:b:c".
 std::vector<std::string> split_name(const std::string& name);
 
-// A copy of the row that `name` asks for, with its settings chosen and told in its name.
+// A copy of the row that `name` states, with its settings applied and listed in its name.
 // InputError where there is no such row or setting. what: kind of the rows.
 template <class Rows>
 auto find_row(const std::string& what, const std::string& name, const Rows& rows) {

@@ -71,7 +71,7 @@ class Scattering {
     by_ = by;
     rough_share_ = shares().rough;
   }
-  // Where shares() is not asked: as another has it.
+  // Where shares() is not evaluated: as another has it.
   void share_as(double rough_share) { rough_share_ = rough_share; }
   // The k-th of the smooth rays.
   SmoothRay<S> smooth_ray(int k) const {

@@ -35,7 +35,7 @@ class Texture : public TexelMap {
   virtual Rgb<double> eval(const TexturePoint<double>& point) const = 0;
   virtual Rgb<Dual> eval(const TexturePoint<Dual>& point) const = 0;
 
-  // The same texture where one number is asked for (a roughness, a weight): texels give their
+  // The same texture where one number is expected (a roughness, a weight): texels give their
   // luminance, other colours number_of. It shares no mutable data with this one.
   virtual std::shared_ptr<Texture> for_numbers() const = 0;
   bool of_numbers() const { return of_numbers_; }
@@ -69,25 +69,25 @@ class Texture : public TexelMap {
   // weighted sum is looked up.
   virtual TexelWeights texel_weights(const TexturePoint<double>& /*point*/) const { return {}; }
 
-  // Where `eval` jumps (is discontinuous) on a face.
-  struct Jump {
+  // Where `eval` is discontinuous on a face.
+  struct Discontinuity {
     std::array<double, 2> from, to;  // barycentric coordinates of the second and third corner
   };
-  struct Jumps {
-    std::vector<Jump> inside;  // line segments
-    uint8_t sides = 0;         // bit k: along the side from corner k to the next
+  struct Discontinuities {
+    std::vector<Discontinuity> inside;  // line segments
+    uint8_t sides = 0;                  // bit k: along the side from corner k to the next
   };
   // Adds those of a face over which texture coordinates are linear, from these of its corners.
   // False if there would be more than `most` inside; then what is added is not all.
-  virtual bool add_jumps(const std::array<std::array<double, 2>, 3>& /*uv*/, size_t /*most*/,
-                         Jumps& /*jumps*/) const {
+  virtual bool add_discontinuities(const std::array<std::array<double, 2>, 3>& /*uv*/,
+                                   size_t /*most*/, Discontinuities& /*lines*/) const {
     return true;
   }
-  // Whether `eval` may jump at every edge of the mesh.
-  virtual bool jumps_between_faces() const { return false; }
-  // Whether it jumps at the borders of texels. Where these are no edges (of light, of bumps),
-  // derivatives with respect to what moves are refused.
-  virtual bool jumps_between_texels() const { return false; }
+  // Whether `eval` may be discontinuous at every edge of the mesh.
+  virtual bool discontinuous_between_faces() const { return false; }
+  // Whether it is discontinuous at the borders of texels. Where these are no edges (of light, of
+  // bumps), derivatives with respect to what moves are refused.
+  virtual bool discontinuous_between_texels() const { return false; }
   // Whether texture coordinates that differ by integers look up the same value.
   virtual bool has_period_one() const { return false; }
 

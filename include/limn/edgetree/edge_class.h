@@ -20,7 +20,7 @@ enum class EdgeClass : uint8_t {
   // An intersection segment of two faces of any shapes, see crossing_curves.h. Treated as
   // discontinuous from everywhere.
   kIntersection,
-  // A segment inside of a face across which its texture jumps, see texture_edges.h: discontinuous
+  // A segment inside of a face where its texture is discontinuous (texture_edges.h): discontinuous
   // where p sees the face. It hides nothing.
   kTexture,
 };

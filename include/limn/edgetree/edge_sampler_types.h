@@ -24,7 +24,7 @@ struct EdgeSamplerType {
     return maker(settings, input, threads);
   }
 };
-// The first is used where nothing else is asked for.
+// The first is the default.
 std::span<const EdgeSamplerType> edge_sampler_types();
 
 // Finds a sampler by name, which may carry settings. InputError lists the known names.

@@ -139,14 +139,14 @@ struct EdgeRef {
   bool operator==(const EdgeRef&) const = default;
 };
 
-// Where a textured surface may jump at edges between two faces: these are sharp then.
+// Where textures may be discontinuous at edges between two faces: these are sharp then.
 struct TextureSeams {
   bool everywhere = false;  // at all of them
   // Where the faces' texture coordinates differ, or (period_one) differ by other than integers.
   bool coordinates = false;
   bool period_one = false;
-  // F: bit k is set where the texture jumps along the face's side from corner k to the next; or
-  // empty.
+  // F: bit k is set where the texture is discontinuous along the face's side from corner k to
+  // the next; or empty.
   std::vector<uint8_t> sides = {};
 };
 
@@ -154,7 +154,7 @@ struct TextureSeams {
 // from behind. shape: the mesh's shape. Degenerate faces keep a zero normal in `planes` and
 // have no edges: adjacent sides are split at their corners, so that the real neighbours
 // connect. Copies of a vertex with different motions tear the surface: both sides become
-// boundary edges. seams: across which of its edges the surface's texture jumps; null: none.
+// boundary edges. seams: at which of its edges the texture is discontinuous; null: none.
 EdgeMesh build_edge_mesh(const Mesh& mesh, bool black_behind, ShapeId shape = ShapeId(0),
                          const TextureSeams* seams = nullptr);
 

@@ -69,7 +69,7 @@ struct ParameterAdjoint {
 };
 
 struct BackwardResult {
-  std::vector<ParameterAdjoint> parameters;  // in the order asked for
+  std::vector<ParameterAdjoint> parameters;  // in the order requested
   std::string method;                        // that ran: of adaptive the one that it chose
   std::string decision;                      // what its pilot found; empty without one
   std::vector<TermRun> terms;                // all that the scene has

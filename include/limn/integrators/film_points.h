@@ -10,7 +10,7 @@ enum class FilmPoints {
   kRandom,  // samples, as every method
   // One point for each face that a pixel shows, at the centroid of what is seen of it, times the
   // area of that: no chance is left, and an image is a continuous function of the scene whose exact
-  // derivative is that which is told, silhouettes in view included. How far it is off falls with
+  // derivative is the one returned, silhouettes in view included. How far it is off falls with
   // the size of a pixel (integrators/film/README.md). Needs a box filter. Numbers of samples, seeds
   // and limits of time are not looked at.
   kFaces
@@ -18,7 +18,7 @@ enum class FilmPoints {
 inline constexpr const char* kFilmPoints[] = {"random", "faces"};  // by their numbers
 inline const char* name_of(FilmPoints points) { return kFilmPoints[static_cast<int>(points)]; }
 
-// InputError for others than random where light is not in closed form. method: the one asked for.
+// InputError for others than random where light is not in closed form. method: the one requested.
 void check_points(FilmPoints points, bool closed_light, const std::string& method);
 
 // Those of a run over these points: of faces there is one pass, and no limit of time. InputError

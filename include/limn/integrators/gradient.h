@@ -79,7 +79,7 @@ struct ParameterGradient {
   std::string name;
   Moments total;
   std::vector<Moments> terms;  // as in GradientResult::terms; empty for those not computed
-  // One value per block: the sum over its pixels and channels. Empty unless asked for.
+  // One value per block: the sum over its pixels and channels. Empty unless requested.
   Moments total_blocks;
   std::vector<Moments> term_blocks;
   Moments image_sum;  // one value: the sum over all pixels and channels
@@ -111,7 +111,7 @@ struct GradientStats {
 
 struct GradientResult {
   std::string method;
-  std::vector<ParameterGradient> parameters;  // in the order asked for
+  std::vector<ParameterGradient> parameters;  // in the order requested
   Moments radiance;                           // the image itself, from the same samples
   std::vector<TermRun> terms;                 // all that the scene has, in the method's order
   int64_t spp = 0;                            // samples per pixel that were finished

@@ -16,7 +16,7 @@ class Method {
   // The default of a task.
   explicit Method(Task task);
   // A name with or without settings, as "forest:width=4". InputError that lists the known names,
-  // settings or values, and for a name of earlier versions tells the one of today.
+  // settings or values, and for a name of earlier versions states today's.
   Method(const std::string& name);  // NOLINT: options are given names
   Method(const char* name) : Method(std::string(name)) {}
 

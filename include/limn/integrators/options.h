@@ -1,11 +1,10 @@
 #pragma once
 // The options of runs: one row for each field, with its name, range and help. What the command line
 // takes, the arguments and documentation of Python's functions, the checks of ranges and the JSON
-// of fits are made from these rows.
+// of fits are made from these rows. Those of reverse mode and fits: fit_options.h.
 #include <limits>
 
 #include "limn/integrators/check.h"
-#include "limn/integrators/fit.h"
 #include "limn/integrators/gradient.h"
 #include "limn/integrators/option.h"
 #include "limn/integrators/render.h"
@@ -13,7 +12,6 @@
 namespace limn {
 
 inline constexpr const char* kFilms[] = {"rays", "exact"};
-inline constexpr const char* kPixels[] = {"adjoint", "uniform"};
 
 inline constexpr Option kPointsOption = choice(
     "points", kFilmPoints,
@@ -30,12 +28,6 @@ inline constexpr Option kGeneratorOption =
            "Sample generator: Owen-scrambled Sobol' points (a third of the squared error, mostly, "
            "but no standard errors), or independent random numbers")
         .samples();
-inline constexpr Option kLossOption = choice("loss", kLosses, "Loss: l2, relative-l2 or l1");
-inline constexpr Option kPyramidOption{
-    "pyramid",
-    "Levels of an image pyramid, each half as large as the one before. The loss is the mean over "
-    "the levels",
-    1, 32};
 
 // What a run is to do; the scene's file says the rest.
 struct RunRequest {
@@ -134,104 +126,6 @@ void visit_options(Like<CheckOptions> auto& o, auto&& visit) {
   visit_options(o.blur, visit);
   visit(o.exact_film, kFilmOption);
   visit(o.points, kPointsOption);
-}
-
-void visit_options(Like<BackwardOptions> auto& o, auto&& visit, Task task = Task::kBackward) {
-  visit(o.method, method_option(task));
-  visit(o.terms, terms_option(task));
-  visit(o.uniform_pixels,
-        choice("pixels", kPixels,
-               "Pixels in which paths start: adjoint (more where the loss depends more on the "
-               "pixel) or uniform")
-            .with(&Option::flag, "uniform_pixels")
-            .samples());
-  visit(o.points, kPointsOption);
-  visit(o.edge_samples,
-        Option{"edge_samples", "Boundary samples per path vertex", 1, 1 << 16}.samples());
-  visit(o.camera_samples,
-        Option{"camera_samples", "Boundary samples on the film per path (term camera)", 1e-6L,
-               1 << 16}
-            .or_zero("0.25, 1 with the method analytic")
-            .samples());
-  visit(o.shadow_samples,
-        Option{"shadow_samples",
-               "Boundary samples on the edges of visible shadows per path (terms shadow and "
-               "penumbra)",
-               1e-6L, 1 << 16}
-            .samples());
-  if (task == Task::kFit) return;
-  visit(o.batches, Option{"batches",
-                          "Most batches, from which standard errors come; each takes some time per "
-                          "vertex",
-                          1, 1 << 16}
-                       .samples());
-}
-
-void visit_options(Like<LossOptions> auto& o, auto&& visit) {
-  visit(o.kind, kLossOption);
-  visit(o.levels, kPyramidOption);
-  visit(o.method, method_option(Task::kImage));
-  visit(o.points, kPointsOption);
-}
-
-void visit_options(Like<FitOptions> auto& o, auto&& visit) {
-  visit(o.loss, kLossOption);
-  visit(o.pyramid, kPyramidOption);
-  visit(o.optimiser,
-        choice("optimiser", kOptimisers,
-               "Optimiser: adam-uniform (Adam with one scale for all vertices of a shape), adam, "
-               "gradient-descent, or lbfgs, which needs a loss without noise (the method "
-               "analytic)"));
-  visit(o.step, Option{"step",
-                       "Length of the first step in natural steps: 1 % of a shape's diagonal, 0.01 "
-                       "radians, 1 % of a value",
-                       1e-12L, 1e12L});
-  visit(o.step_half_life,
-        Option{"step_half_life", "Halve the step length every so many steps", 1, 1 << 30}.or_zero(
-            "never"));
-  visit(o.smoothing, Option{"smoothing",
-                            "How far the step of a vertex spreads over the mesh, as a share of the "
-                            "shape's diagonal (0: no smoothing)",
-                            0, 100});
-  visit(o.remesh, Option{"remesh", "Steps after which optimised meshes are remeshed, as in 100,200",
-                         1, 1 << 30});
-  visit(o.remesh_edge,
-        Option{"remesh_edge", "Edge length after remeshing, relative to the mean length before",
-               0.1L, 10});
-  visit(o.remesh_shrink,
-        Option{"remesh_shrink", "Factor on the lengths of steps and smoothing after each remeshing",
-               0.01L, 1});
-  visit(
-      o.blur_steps,
-      Option{"blur_steps",
-             "Begin with so many steps on a scene whose faces are blurred, with gradients of what "
-             "does not overlap yet; `sigma` is then needed, and scalars and colours are fitted",
-             1, 1 << 30}
-          .or_zero("none"));
-  visit(o.blur.sigma, Option{"sigma",
-                             "In the first step, square of the width over which faces fade beyond "
-                             "their sides, in squared scene units",
-                             1e-30L, 1e30L}
-                          .or_zero("not blurred"));
-  visit(o.sigma_end,
-        Option{"sigma_end", "The same in the last of `blur_steps`", 1e-30L, 1e30L}.or_zero(
-            "a hundredth of `sigma`"));
-  visit(o.blur.gamma, Option{"gamma",
-                             "Depth over which blurred surfaces mix in the first step, in scene "
-                             "units; it shrinks as the root of sigma does",
-                             1e-15L, 1e15L}
-                          .or_zero("none"));
-  visit(o.loss_spp, Option{"loss_spp",
-                           "Samples per pixel of each of the two images from which the loss is "
-                           "computed",
-                           1, 1 << 30}
-                        .or_zero("`spp`")
-                        .samples());
-  visit(o.spp_doubling,
-        Option{"spp_doubling", "Double the samples per pixel every so many steps", 1, 1 << 30}
-            .or_zero("never")
-            .samples());
-  visit_options(o.backward, visit, Task::kFit);
 }
 
 }  // namespace limn

@@ -35,7 +35,7 @@ enum class RenderWhat {
 inline constexpr const char* kRenderWhat[] = {"image", "direct", "ao", "openness"};
 
 // Where the random numbers of a pixel's samples come from. The first is what `limn render` takes,
-// the second that of RenderOptions and Python, where variances are asked for.
+// the second that of RenderOptions and Python, where variances are requested.
 inline constexpr const char* kGenerators[] = {"sobol", "independent"};
 
 struct RenderOptions {
@@ -49,7 +49,7 @@ struct RenderOptions {
   // silhouettes, lines: lines through the sky, 1 to 16384; a quarter of them through an emitter.
   // With a tolerance above 0 (at most 1) they, 8 at least, are doubled until two halves differ by
   // at most twice this part of the result, or until there are 16384, which RenderResult::warnings
-  // tells; what is left of the error is no longer without bias, and silhouettes takes lines
+  // reports; what is left of the error is no longer without bias, and silhouettes takes lines
   // everywhere. InputError for others.
   int lines = 64;
   double tolerance = 0;

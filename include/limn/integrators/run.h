@@ -79,7 +79,7 @@ struct TermCost {
   uint64_t occluded = 0;     // the edge point is hidden (or, for the camera, off the film)
   uint64_t counted = 0;
   // Where directions are warped (of paths).
-  uint64_t warped = 0;     // directions whose motion auxiliary rays told
+  uint64_t warped = 0;     // directions whose motion auxiliary rays determined
   uint64_t dominated = 0;  // of which one ray held nine tenths of the weights
   uint64_t dropped = 0;    // auxiliary rays on an edge to rounding
   LargestSample largest;
