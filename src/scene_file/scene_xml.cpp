@@ -60,7 +60,8 @@ class SceneBuilder {
     }
     errors_.throw_any();
     if (scene_.sensors.empty()) {
-      throw InputError(description_.where, "<scene>: there is no sensor");
+      throw InputError(description_.where,
+                       "<scene>: there is no sensor; limn renders with the scene's own: add one");
     }
     use_sensor(scene_, "0");
     add_exposure();

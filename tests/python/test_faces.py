@@ -138,7 +138,7 @@ def test_a_fit_goes_the_programs_way(lit, run, folder):
     (lambda s, a: limn.backward(s, a, edge_samples=2, **REVERSE), "error: edge_samples: "),
     (lambda s, a: limn.backward(s, a, camera_samples=2, **REVERSE), "error: camera_samples: "),
     (lambda s, a: limn.backward(s, a, shadow_samples=2, **REVERSE), "error: shadow_samples: "),
-    (lambda s, a: limn.backward(s, a, points="faces"), 'needs light in closed form.*"forest"'),
+    (lambda s, a: limn.backward(s, a, points="faces"), 'needs light in closed form.*"adaptive"'),
     (lambda s, a: limn.image_loss(s, a, spp=4, **FACES), "error: spp: "),
     (lambda s, a: limn.image_loss(s, a, points="faces"), "needs light in closed form"),
     (lambda s, a: limn.Fit(s, a, "lamp.radiance", loss_spp=2, **REVERSE), "error: loss_spp: "),
