@@ -477,7 +477,7 @@ TEST_F(Program, AuxiliaryRaysAreForMethodsThatTraceThem) {
   const std::pair<std::string, std::string> mistakes[] = {
       {"gradient " + where + " -o " + out(), "the method \"adaptive\" has none"},
       {"check " + where + " --method fd", "the method \"fd\" has none"},
-      {"check " + where + " --reverse", "the method \"forest\" has none"},
+      {"check " + where + " --reverse", "the method \"adaptive\" has none"},
       {"compare " + where + " --time 0.1 --methods forest,fd -o " + files_.path("folder"),
        "none of the methods forest, fd has any"}};
   for (const auto& [command, text] : mistakes) {
