@@ -23,6 +23,7 @@ namespace {
 // Of every term: degrees of freedom, and paths that each of them has. Always as many, so that runs
 // of any length have the same plan, with a limit of time or in parts, too. Not tuned.
 constexpr size_t kBatches = 16, kPaths = 64;
+constexpr uint64_t kStream = 0x9e1107;  // of random numbers; any
 // A path that a pilot looks at with every term of both methods takes as long as so many of a run's.
 constexpr double kCostOfProbe = 10;  // not tuned
 // The same of each number of a gradient, which every batch gathers, and of each face, which both
@@ -150,11 +151,22 @@ class Probe {
     settings_.progress = nullptr;
   }
 
+  // Seconds of so many paths in each batch, with all terms and their usual numbers.
+  double seconds(ReverseEstimator& estimator, int paths) const {
+    const double before = watch_.seconds();
+    estimator.probe(paths / pixels_, {});
+    ProgressCounter progress(settings_, watch_, 1);
+    parallel_for(kBatches, settings_.threads, [&](size_t b) {
+      const int first = static_cast<int>(b);
+      run_batch(estimator, {mix_bits(settings_.seed + kStream), first, first + 1}, 1, progress);
+    });
+    estimator.probe(1, {});
+    return watch_.seconds() - before;
+  }
   // Of the paths of a batch, or as many samples of the film as belong to them.
   ReverseFigures figures(ReverseEstimator& estimator, size_t slot) const {
     estimator.probe(kPaths / pixels_, slot);
     ProgressCounter progress(settings_, watch_, 1);
-    constexpr uint64_t kStream = 0x9e1107;  // any number
     std::vector<std::vector<double>> slopes(kBatches);
     std::vector<TermCost> costs(kBatches);
     std::vector<ListCount> lists(kBatches);
@@ -242,15 +254,19 @@ struct Candidate {
     }
     return errors;
   }
+  double work(const std::vector<double>& samples) const {
+    double work = 0;
+    for (size_t slot = 0; slot < figures.size(); ++slot)
+      if (samples[slot] > 0) work += figures[slot].cost_of(samples[slot]);
+    return work;
+  }
   // units: of the squared error along every direction; all directions count alike.
   double product(const std::vector<double>& samples, const std::vector<double>& units) const {
-    double error = 0, work = 0;
+    double error = 0;
     const std::vector<double> list = errors(samples);
     for (size_t d = 0; d < list.size(); ++d)
       if (units[d] > 0) error += list[d] / units[d];
-    for (size_t slot = 0; slot < figures.size(); ++slot)
-      if (samples[slot] > 0) work += figures[slot].cost_of(samples[slot]);
-    return error * work;
+    return error * work(samples);
   }
   std::vector<double> usual() const {
     std::vector<double> samples;
@@ -304,23 +320,23 @@ class Pilot {
  public:
   // settings: of a run with a limit of time, those between which it has a pilot or has none.
   Pilot(const Scene& scene, const Image& adjoint, const BackwardOptions& options,
-        RunSettings& settings, const Stopwatch& watch) {
+        RunSettings& settings, const Stopwatch& watch)
+      : watch_(watch), pixels_(static_cast<double>(film_size(scene.film)) / 3) {
     const auto add = [&](const char* method) {
       candidates_.push_back({std::make_unique<ReverseEstimator>(
           scene, adjoint, with_method(options, method), settings.threads)});
     };
     add("forest");
     if (!candidates_[0].has_choice()) return;
-    const double pixels = static_cast<double>(film_size(scene.film)) / 3;
-    const int least = least_samples(pixels);
-    if (settings.spp < least) return;
+    least_ = least_samples();
+    if (settings.spp < least_) return;
     probe_ = std::make_unique<Probe>(*candidates_[0].estimator, settings, watch);
-    looks_ = fits(least, pixels, settings, watch);
+    looks_ = fits(settings);
     const bool draws = candidates_[0].estimator->draws_at_vertices();
     if (looks_ && draws && LightRegions::any_in(scene)) add("silhouettes");
   }
 
-  ReversePlan plan() {
+  ReversePlan plan(RunSettings& settings) {
     if (!looks_) return {std::move(candidates_[0].estimator), ""};
     for (Candidate& candidate : candidates_) measure(candidate);
     if (candidates_.size() > 1) raise_unseen();
@@ -336,6 +352,15 @@ class Pilot {
       }
     }
     const bool gains = chosen != &candidates_[0] || best.product < kConvincing * usual;
+    if (settings.seconds > 0) {
+      const double work = candidates_[0].work(candidates_[0].usual());
+      const double ratio = gains && work > 0 ? chosen->work(best.samples) / work : 1;
+      if (!leaves_time(settings, ratio)) {
+        stay_below(settings);
+        return {std::move(candidates_[0].estimator), ""};
+      }
+      settings.least_spp = std::max(settings.least_spp, least_);
+    }
     ReversePlan plan{std::move(chosen->estimator), ""};
     if (gains) plan.estimator->set_samples(best.samples);
     plan.decision = fmt::format(
@@ -348,33 +373,34 @@ class Pilot {
 
  private:
   // Of a run of which pilots are no more than their share.
-  int least_samples(double pixels) const {
+  int least_samples() const {
     double numbers = 0;
     for (const size_t count : candidates_[0].estimator->sizes())
       numbers += static_cast<double>(count);
     for (const Shape& shape : candidates_[0].estimator->scene().shapes)
       numbers += static_cast<double>(shape.mesh.faces.size());
     const double paths = kBatches * kPaths * kCostOfProbe + kCostOfNumber * numbers;
-    return static_cast<int>(std::ceil(paths / (kShare * pixels)));
+    constexpr double kLeast = 3;  // runs below have two, for standard errors
+    return static_cast<int>(std::max(kLeast, std::ceil(paths / (kShare * pixels_))));
   }
-  // Whether a run of the least samples with a pilot fits into its time, by a few paths. From then
-  // on it comes to these, or stays below.
-  bool fits(int least, double pixels, RunSettings& settings, const Stopwatch& watch) {
+  // Whether a run of the least samples fits into its time. From then on it comes to these, or stays
+  // below.
+  bool fits(RunSettings& settings) {
     if (settings.seconds == 0) return true;
-    if (least > 1) {
-      ReverseEstimator& estimator = *candidates_[0].estimator;
-      const double before = watch.seconds();
-      probe_->figures(estimator, estimator.pixel_slot());
-      const double each = (watch.seconds() - before) / (kBatches * kPaths);
-      // Without edges a path takes a fifth of the time.
-      if (5 * each * least * pixels > settings.seconds - before) {
-        settings.spp = least - 1;
-        return false;
-      }
-    }
-    settings.least_spp = std::max(settings.least_spp, least);
-    return true;
+    ReverseEstimator& estimator = *candidates_[0].estimator;
+    gathering_ = probe_->seconds(estimator, 1);
+    const double more = probe_->seconds(estimator, kPaths) - gathering_;
+    path_ = std::max(more, 0.0) / (kBatches * (kPaths - 1));
+    if (leaves_time(settings, 1)) return true;
+    stay_below(settings);
+    return false;
   }
+  // work: of the samples at a path, over that of the usual ones.
+  bool leaves_time(const RunSettings& settings, double work) const {
+    const double needed = path_ * work * least_ * pixels_ + gathering_;
+    return needed <= settings.seconds - watch_.seconds();
+  }
+  void stay_below(RunSettings& settings) const { settings.spp = least_ - 1; }
   // Terms that no vertex has part in are the same in all.
   void measure(Candidate& candidate) {
     const bool misses = &candidate == &candidates_[0];
@@ -406,6 +432,10 @@ class Pilot {
     }
   }
 
+  const Stopwatch& watch_;
+  const double pixels_;
+  int least_ = 0;
+  double gathering_ = 0, path_ = 0;  // seconds of a run's batches without paths; of one path
   std::vector<Candidate> candidates_;
   std::unique_ptr<Probe> probe_;
   bool looks_ = false;
@@ -429,7 +459,7 @@ ReversePlan planned(const Scene& scene, const Image& adjoint, const BackwardOpti
                     leaves_numbers(options) && !options.uniform_pixels &&
                     !needs_times(scene, reverse_parameters(scene, options));
   if (!free) return plain(without_pilot(options));
-  return Pilot(scene, adjoint, options, settings, watch).plan();
+  return Pilot(scene, adjoint, options, settings, watch).plan(settings);
 }
 
 }  // namespace limn

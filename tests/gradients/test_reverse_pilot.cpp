@@ -12,9 +12,10 @@ namespace limn {
 namespace {
 
 // A torus between a lamp and a glossy floor.
-Scene shadowed(const TempFiles& files) {
+Scene shadowed(const TempFiles& files, int width = 32, int height = 32) {
   SceneParts parts;
-  parts.width = parts.height = 32;
+  parts.width = width;
+  parts.height = height;
   parts.max_depth = 3;
   parts.origin = {0, 2.5, 4};
   parts.target = {0, 0.4, 0};
@@ -80,6 +81,13 @@ TEST(ReversePilot, ChoosesAlikeInLimitedTime) {
     EXPECT_EQ(timed.method, all.method);
     EXPECT_EQ(means(timed), means(all));
   }
+}
+
+// Where two samples of a pixel would be enough for a pilot, too.
+TEST(ReversePilot, LeavesStandardErrorsInTheShortestTime) {
+  const TempFiles files;
+  const BackwardResult timed = run(shadowed(files, 256, 200), "adaptive", 100000, 3, 2, 0.001);
+  EXPECT_EQ(timed.spp, 2);
 }
 
 // `boundary` of `forest` has what `silhouettes` leaves to `direct`: a check compares one of both.
