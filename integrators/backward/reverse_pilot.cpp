@@ -365,9 +365,9 @@ class Pilot {
     if (gains) plan.estimator->set_samples(best.samples);
     plan.decision = fmt::format(
         "pilot of {} paths for each term: {} with {} numbers; squared error x work {:.3g} of that "
-        "of forest with the usual numbers",
+        "of forest with the usual numbers, if its edges vary {:g} times what was seen",
         kBatches * kPaths, plan.estimator->method_name(), gains ? "these" : "the usual",
-        gains && usual > 0 ? best.product / usual : 1.0);
+        gains && usual > 0 ? best.product / usual : 1.0, kUnseen);
     return plan;
   }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "integrators/paths/straight_way.h"
+#include "limn/core/exposure.h"
 
 namespace limn {
 
@@ -37,6 +38,7 @@ TracedScene::TracedScene(const Scene& scene, int threads, const Options& options
                options.edges && has_straight_ways(scene)} {}
 
 std::shared_ptr<const CoincidentFaces> PathChoices::faces_of(const Scene& moved, int threads) {
+  if (moved.exposure && moved.exposure->no_overlaps) return nullptr;  // the tracer's own
   const auto same = [](const Shape& a, const Shape& b) {
     return a.mesh.positions == b.mesh.positions;
   };
