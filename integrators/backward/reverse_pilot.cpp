@@ -20,21 +20,22 @@
 namespace limn {
 namespace {
 
-// Of every term: degrees of freedom, and paths that each of them has. Always as many, so that runs
-// of any length have the same plan, with a limit of time or in parts, too. Not tuned.
+// A pilot of a term traces so many batches of so many paths. Both are constant, so that the plan
+// does not depend on the length of the run, nor on a limit of time. Not tuned.
 constexpr size_t kBatches = 16, kPaths = 64;
 constexpr uint64_t kStream = 0x9e1107;  // of random numbers; any
-// A path that a pilot looks at with every term of both methods takes as long as so many of a run's.
+// The time of a pilot's path with every term of both methods, over that of a path of the run.
 constexpr double kCostOfProbe = 10;  // not tuned
-// The same of each number of a gradient, which every batch gathers, and of each face, which both
-// methods set up: 0.03 to 0.5 timed in four scenes.
+// The time that a pilot takes per number of the gradient, which every batch gathers, and per face,
+// which both methods set up, over that of a path of the run: 0.03 to 0.5 in four scenes.
 constexpr double kCostOfNumber = 0.2;
 constexpr double kShare = 1.0 / 8;  // of a run, at most, for pilots
-// Of the variance at vertices, what further samples at the same ones leave: in a room lit through a
-// window, eight in place of one leave .21 to .49 of it. Not tuned.
+// The share of a term's variance that more edge samples per vertex cannot reduce. In a room lit
+// through a window, eight samples per vertex leave .21 to .49 of the variance of one. Not tuned.
 constexpr double kKept = 0.5;
-// What a choice must leave of squared error x work to be preferred to the usual numbers: where a
-// lattice before a sky promised 0.59 to 0.72 on average, one of five motions got 1.2 to 2.6.
+// Other numbers of samples for `forest` are taken if they are predicted to reduce squared error x
+// work to this share or less: for a lattice in front of a sky the pilot predicted 0.59 to 0.72 on
+// average, but one of five motions got 1.2 to 2.6.
 constexpr double kConvincing = 0.5;
 // The edges that `forest` draws have rare and large samples, most of which a pilot
 // misses; listed silhouettes have none. So their variance is taken to be so many times what the
@@ -71,8 +72,8 @@ std::vector<Vec3d> places_of(const Scene& scene, const Parameter& parameter) {
   return places;
 }
 
-// Of a shape: shifts, turns and smooth random fields, as what optimisers make of gradients is
-// smooth: the noise of single vertices is another, and large.
+// Motions of a shape along which the pilot measures variance: translations, rotations and smooth
+// random fields. Optimisers smooth gradients, so the larger noise of single vertices counts less.
 std::vector<std::function<Vec3d(const Vec3d&)>> smooth_fields() {
   constexpr uint64_t kWaves = 2;  // not tuned
   constexpr double kPeriods = 2;  // over the shape; not tuned
