@@ -8,47 +8,54 @@ namespace {
 
 const double kInverseSqrtPi = 1 / std::sqrt(kPi);
 
-// The x >= 0 with erfc(x) = q, 0 < q <= 1: Winitzki's approximation (2008, 4e-3 off), then two
-// steps of Halley's method, each of which cubes the error.
-double inverse_erfc(double q) {
+// u = 0 would give the slope minus infinity.
+constexpr double kTiny = 0x1.0p-60;
+
+// The x >= 0 with erfc(x) = q, 0 < q <= 1, by Winitzki's approximation (2008): 7e-3 off at most up
+// to x = 5.4, beyond which erfc is below 1e-13.
+double nearly_inverse_erfc(double q) {
   const double log_term = std::log(q * (2 - q));
   const double b = 2 / (kPi * 0.147) + 0.5 * log_term;
-  double x = std::sqrt(std::max(0.0, std::sqrt(b * b - log_term / 0.147) - b));
-  for (int i = 0; i < 2; ++i) {
-    const double newton = (std::erfc(x) - q) / (2 * kInverseSqrtPi * std::exp(-x * x));
-    x += newton / (1 + x * newton);
-  }
-  return x;
+  return std::sqrt(std::max(0.0, std::sqrt(b * b - log_term / 0.147) - b));
+}
+
+// Better by four terms of the inverse's Taylor series around there: 5e-8 off at most up to
+// x = 5.4, 1e-9 up to 4.8.
+double inverse_erfc(double q) {
+  const double x = nearly_inverse_erfc(q), x2 = x * x;
+  const double d = (std::erfc(x) - q) / (2 * kInverseSqrtPi * std::exp(-x2));
+  return x + d * (1 + d * (x + d * ((1 + 4 * x2) / 3 + d * x * (7 + 12 * x2) / 6)));
+}
+
+template <class Inverse>
+double gaussian_slope_by(const Inverse& inverse, double u) {
+  return u < 0.5 ? -inverse(2 * std::max(u, kTiny)) : inverse(2 * (1 - u));
 }
 
 }  // namespace
 
-double gaussian_slope(double u) {
-  constexpr double kTiny = 0x1.0p-60;  // u = 0 would be minus infinity
-  return u < 0.5 ? -inverse_erfc(2 * std::max(u, kTiny)) : inverse_erfc(2 * (1 - u));
-}
+double gaussian_slope(double u) { return gaussian_slope_by(inverse_erfc, u); }
 
 // The density is (c - x s)^+ exp(-x^2) up to a factor; its integral up to x,
 //   F(x) = c erfc(-x) + s exp(-x^2) / sqrt(pi)   (times sqrt(pi) / 2),
-// is inverted by Newton's method, safeguarded by a bracket.
+// is inverted by Halley's method, safeguarded by a bracket.
 // Heitz and d'Eon 2014, "Importance sampling microfacet-based BSDFs using the distribution of
 // visible normals".
 double beckmann_slope(double c, double s, double u) {
-  const auto integral = [=](double x) {
-    return c * std::erfc(-x) + s * kInverseSqrtPi * std::exp(-x * x);
-  };
   double low = -7;  // beyond: 1e-21 of all slopes
   double high = c < 7 * s ? c / s : 7;
-  const double target = u * integral(high);
-  double x = std::min(gaussian_slope(u), 0.5 * (low + high) + 0.5 * (high - low) * 0.999);
+  const double target = u * (c * std::erfc(-high) + s * kInverseSqrtPi * std::exp(-high * high));
+  double x = std::min(gaussian_slope_by(nearly_inverse_erfc, u),
+                      0.5 * (low + high) + 0.5 * (high - low) * 0.999);
   for (int i = 0; i < 60; ++i) {
-    const double error = integral(x) - target;
+    const double gauss = kInverseSqrtPi * std::exp(-x * x), facing = c - x * s;
+    const double error = c * std::erfc(-x) + s * gauss - target;
     (error > 0 ? high : low) = x;
-    const double slope = 2 * kInverseSqrtPi * std::exp(-x * x) * (c - x * s);
-    double next = x - error / slope;
+    const double newton = error / (2 * gauss * facing);
+    double next = x - newton / (1 + newton * (x + 0.5 * s / facing));
+    // The next error is about the cube of this step.
+    if (std::fabs(next - x) <= 1e-5) return next;
     if (!(next > low && next < high)) next = 0.5 * (low + high);
-    // Newton's next error is about the square of this step.
-    if (std::fabs(next - x) <= 1e-8) return next;
     x = next;
   }
   return x;

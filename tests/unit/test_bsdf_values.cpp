@@ -4,6 +4,7 @@
 #include "limn/core/bsdf.h"
 #include "limn/core/make_bsdf.h"
 #include "limn/core/rng.h"
+#include "src/bsdf/microfacet.h"
 #include "support/running_mean.h"
 #include "support/test_properties.h"
 
@@ -17,6 +18,22 @@ const Vec3d kDirections[][2] = {
     {{0.309426374, 0.206284249, 0.928279122}, {-0.267261242, -0.32071349, 0.908688223}},
     {{0.92998111, 0.116247639, 0.348742916}, {-0.835169981, 0.357929992, 0.41758499}},
     {{0.107832773, -0.215665546, 0.970494959}, {0.609207699, 0.609207699, 0.507673083}}};
+
+// The share of slopes up to x, of microfacet::beckmann_slope's density, but for a factor.
+double slopes_up_to(double x, double c, double s) {
+  return c * std::erfc(-x) + s * std::exp(-x * x) / std::sqrt(kPi);
+}
+
+TEST(Beckmann, SlopesInvertTheirDistribution) {
+  for (const double c : {0.0, 0.01, 0.3, 0.8, 0.999, 1.0}) {
+    const double s = std::sqrt(1 - c * c);
+    const double all = slopes_up_to(c < 7 * s ? c / s : 7, c, s);
+    for (double u = 1.0 / 512; u < 1; u += 1.0 / 256) {
+      EXPECT_NEAR(slopes_up_to(microfacet::beckmann_slope(c, s, u), c, s), u * all, 1e-13);
+      EXPECT_NEAR(std::erfc(-microfacet::gaussian_slope(u)), 2 * u, 1e-11);
+    }
+  }
+}
 
 struct Reference {
   std::string type;
