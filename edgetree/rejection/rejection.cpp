@@ -88,8 +88,6 @@ Reach reach_from(const EdgeSamplerInput& input, const RejectionTree& tree, const
   const std::vector<uint32_t> running = running_candidates(input, tree, p);
   const auto nodes = tree.nodes();
   Reach reach;
-  std::vector<bool> goes_on(nodes.size());  // accepted with an accepted child
-  std::vector<uint32_t> inner;              // accepted, not edges
   for (uint32_t i = 0; i < nodes.size();) {
     const RejectionNode& node = nodes[i];
     const bool holds = running[node.end] > running[node.begin];
@@ -100,18 +98,9 @@ Reach reach_from(const EdgeSamplerInput& input, const RejectionTree& tree, const
     counts.accepted += accepted;
     counts.false_accepts += accepted && !holds;
     counts.missed += !accepted && holds;
-    if (accepted && node.parent != RejectionTree::kNoNode) goes_on[node.parent] = true;
-    if (accepted && node.after == i + 1) {
+    if (accepted && node.after == i + 1)
       (holds ? reach.silhouettes : reach.false_accepts).push_back(tree.edges()[node.begin]);
-    } else if (accepted) {
-      inner.push_back(i);
-    }
     i = accepted ? i + 1 : node.after;
-  }
-  for (const uint32_t i : inner) {
-    if (goes_on[i]) continue;
-    const auto edges = tree.edges(i);
-    reach.false_positives.insert(reach.false_positives.end(), edges.begin(), edges.end());
   }
   reach.missed = not_reached(input, reach.silhouettes, p);
   return reach;

@@ -655,11 +655,9 @@ TEST_F(Program, ShowsRejection) {
   EXPECT_EQ(report["kind"], "reject");
   EXPECT_EQ(report["edges"], 3 * 16 * 8);
   EXPECT_EQ(report["variants"].size(), 4u);
-  std::vector<std::string> pictures = {report["overview"]};
+  std::vector<std::string> pictures;
   for (const auto& variant : report["variants"]) {
-    pictures.push_back(variant["edges_picture"]);
-    EXPECT_EQ(variant["reachable_edges"],
-              variant["silhouettes"].get<int>() + variant["false_accepts"].get<int>());
+    EXPECT_GE(variant["reached_per_silhouette"], 1);
     EXPECT_EQ(variant["slices"].size(), 2u);
     for (const auto& slice : variant["slices"]) {
       pictures.push_back(slice["picture"]);
@@ -676,7 +674,7 @@ TEST_F(Program, ShowsRejectionInAScene) {
   const std::string reject = "reject " + scene_ +
                              " --no-report --quiet --methods forest --size 16 --points 4 -o " +
                              folder;
-  const Outcome outcome = run(reject + " --shape screen --point 0,3,0 --view 1,0.2,0 --node 0");
+  const Outcome outcome = run(reject + " --shape screen --node 0");
   EXPECT_EQ(outcome.status, 0) << outcome.text;
   EXPECT_EQ(outcome.text, "");
   EXPECT_EQ(read_json(folder + "/reject.json")["shape"], "screen");
@@ -685,11 +683,6 @@ TEST_F(Program, ShowsRejectionInAScene) {
                       "screen, lamp)"),
             std::string::npos);
   EXPECT_NE(refused(reject + " --node 4000").find("--node 4000: forest has nodes 0 to"),
-            std::string::npos);
-  EXPECT_NE(refused(reject + " --view 1,2").find("--view"), std::string::npos);
-  EXPECT_NE(refused(reject + " --up 0,0,0").find("--up: a direction cannot be 0,0,0"),
-            std::string::npos);
-  EXPECT_NE(refused(reject + " --point 0,nan,0").find("--point: must be finite"),
             std::string::npos);
   EXPECT_NE(refused(reject + " --methods forest,brute")
                 .find("\"brute\" is no sampler with a rejection test (known: "

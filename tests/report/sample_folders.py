@@ -198,7 +198,6 @@ def variant(folder, name, hit_rate, wrong, missed=0):
                 "points": 1900 + int(2000 * wrong) + missed,
             }
         )
-    slice_picture(os.path.join(folder, f"{name}_edges.png"), 0.1, 0.15)
     depths = [
         {"depth": d, "nodes_tested": 4**d, "accepted": 2**d, "false_accepts": int(wrong * 2**d)}
         for d in range(7)
@@ -207,10 +206,7 @@ def variant(folder, name, hit_rate, wrong, missed=0):
         "name": name,
         "description": f"about {name}",
         "slices": slices,
-        "edges_picture": f"{name}_edges.png",
-        "reachable_edges": int(900 * (1 + wrong)),
-        "silhouettes": 700,
-        "false_accepts": int(900 * wrong),
+        "reached_per_silhouette": 1.3 * (1 + wrong),
         "hit_rate": hit_rate,
         "hit_rate_stderr": 0.004,
         "by_depth": depths,
@@ -219,7 +215,6 @@ def variant(folder, name, hit_rate, wrong, missed=0):
 
 def rejection(folder, mesh, missed=0):
     os.makedirs(folder)
-    write_png(os.path.join(folder, "overview.png"), np.full((SIZE, SIZE, 3), 0.7))
     variants = [
         variant(folder, "forest", 0.91, 0.22),
         variant(folder, "forest:axes=any", 0.66, 0.3),
@@ -232,7 +227,6 @@ def rejection(folder, mesh, missed=0):
         "edges": 104340,
         "seed": 3,
         "variants": variants,
-        "overview": "overview.png",
         "node": {"depth": 4, "edges": 310},
     }
     with open(os.path.join(folder, "reject.json"), "w") as out:

@@ -324,9 +324,9 @@ class TestFigures(unittest.TestCase):
         self.assertIn("limn compare scenes/mirror.xml", page)
         self.assertIn("limn reject meshes/bunny.ply", page)
         self.assertNotIn("Picture missing", page)
-        # Scene, reference and two of each method that ran, and the reference behind them; overview
-        # and three of each variant.
-        self.assertEqual(page.count("data:image/png;base64,"), 3 + 2 * 5 + 1 + 3 * 3)
+        # Scene, reference and two of each method that ran, and the reference behind them; two of
+        # each variant.
+        self.assertEqual(page.count("data:image/png;base64,"), 3 + 2 * 5 + 2 * 3)
         self.assertIn("Mitsuba is not installed", page)
         self.assertEqual(page.count('class="bad"'), 1)  # the method that is made biased
         self.assertIn("<td>800</td><td>5.00</td><td>70 %</td><td>0.250</td><td>0.0500</td><td>70.0</td>", page)

@@ -1,24 +1,25 @@
-// limn reject: measures what samplers reject, draws it, writes pictures and figures.
-#include "tools/limn/command_reject.h"
-#include "limn/core/make_bsdf.h"
-
-#include "tools/limn/commands.h"
-#include "tools/limn/report_script.h"
-
+// limn reject: measures what samplers reject, and draws it over slices of space.
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <numeric>
 
 #include "limn/core/error.h"
+#include "limn/core/image.h"
+#include "limn/core/make_bsdf.h"
 #include "limn/core/names.h"
 #include "limn/core/parallel.h"
 #include "limn/edgetree/edge_sampler_types.h"
 #include "limn/edgetree/quadric_chart.h"
-#include "tools/limn/reject/reject_figures.h"
-#include "tools/limn/reject/reject_pictures.h"
+#include "limn/edgetree/rejection_places.h"
+#include "tools/limn/command_support.h"
+#include "tools/limn/commands.h"
+#include "tools/limn/output_files.h"
+#include "tools/limn/report_script.h"
+#include "tools/limn/table.h"
 #include "tools/limn/terminal.h"
 
 namespace limn {
@@ -27,6 +28,21 @@ namespace {
 using nlohmann::json;
 
 constexpr int kDraws = 100;  // per point, for the acceptance rate
+
+struct RejectCommand {
+  std::string output;  // folder
+  std::string shape;   // id; "" for the one with the most edges
+  // Those whose rejection differs.
+  std::vector<std::string> methods = {"forest", "quadric", "quadric:quadrics=off", "li2019"};
+  std::optional<uint32_t> node;  // of the first method's tree
+  uint32_t node_edges = 256;     // a node of about this size, if none is named
+  double extent = 1.3;           // half-width of slices in radii of the mesh
+  double distance = 0.5;         // between them
+  int size = 768;                // of pictures, pixels
+  int points = 400;              // for the counts by depth and the acceptance rate
+  bool report = true;
+  std::string command_line;
+};
 
 json to_json(const Vec3d& v) { return {v.x, v.y, v.z}; }
 
@@ -70,19 +86,15 @@ EdgeMesh keep_one_shape(Scene& scene, const std::string& id) {
   return chosen;
 }
 
-struct Sphere {
-  Vec3d center;
-  double radius = 0;
-};
-Sphere sphere_around(const EdgeMesh& mesh) {
+double radius_of(const EdgeMesh& mesh) {
   Bounds bounds;
   for (const Edge& edge : mesh.edges)
     for (const VertexId vertex : edge.vertices) bounds.extend(mesh.position(vertex));
-  Sphere sphere{bounds.center()};
+  double radius = 0;
   for (const Edge& edge : mesh.edges)
     for (const VertexId vertex : edge.vertices)
-      sphere.radius = std::max(sphere.radius, length(mesh.position(vertex) - sphere.center));
-  return sphere;
+      radius = std::max(radius, length(mesh.position(vertex) - bounds.center()));
+  return radius;
 }
 
 // ---- Methods.
@@ -105,25 +117,97 @@ std::vector<EdgeSamplerType> chosen_types(const std::vector<std::string>& names)
   return types;
 }
 
+// ---- Figures.
+
+// What was measured of one sampler.
+struct RejectVariant {
+  std::string name, description;
+  Match match;  // its node
+  RejectionNode node{};
+  std::vector<VerdictCounts> slices;
+  ReachCounts counts;  // from many points
+  AcceptanceRate hits;
+
+  // How often a test rejected what holds an edge of E(p), and edges of E(p) that were not reached.
+  uint64_t missed() const {
+    uint64_t sum = counts.missed;
+    for (const VerdictCounts& slice : slices) sum += slice[static_cast<int>(NodeVerdict::kMissed)];
+    for (const DepthCounts& depth : counts.by_depth) sum += depth.missed;
+    return sum;
+  }
+  std::string slice_file(size_t i) const {
+    return fmt::format("{}_slice_{}.png", file_part(name), i);
+  }
+  // Edges where a descent can end over those of E(p) among them.
+  double reached_per_silhouette() const {
+    const auto reached = static_cast<double>(counts.silhouettes + counts.false_accepts);
+    return counts.silhouettes > 0 ? reached / static_cast<double>(counts.silhouettes) : 0;
+  }
+};
+
+constexpr const char* kVerdictNames[kVerdicts] = {"true_reject", "true_accept", "false_accept",
+                                                  "missed"};
+// sRGB, 0xrrggbb; they differ in lightness, too, for the colour-blind.
+constexpr uint32_t kVerdictColors[kVerdicts] = {0xd9d9d9, 0x2f6fb7, 0xf28e2b, 0xd6006e};
+
+uint64_t points_of(const VerdictCounts& counts) {
+  return std::accumulate(counts.begin(), counts.end(), uint64_t{0});
+}
+
+json to_json(const RejectVariant& v) {
+  json slices = json::array(), depths = json::array();
+  for (size_t i = 0; i < v.slices.size(); ++i) {
+    slices.push_back({{"picture", v.slice_file(i)}, {"points", points_of(v.slices[i])}});
+    for (int k = 0; k < kVerdicts; ++k) slices.back()[kVerdictNames[k]] = v.slices[i][k];
+  }
+  for (const DepthCounts& c : v.counts.by_depth) {
+    depths.push_back({{"depth", depths.size() + 1},
+                      {"nodes_tested", c.tested},
+                      {"accepted", c.accepted},
+                      {"false_accepts", c.false_accepts},
+                      {"missed", c.missed}});
+  }
+  return {{"name", v.name},
+          {"description", v.description},
+          {"node",
+           {{"index", v.match.node},
+            {"depth", v.node.depth},
+            {"edges", v.node.end - v.node.begin},
+            {"overlap", v.match.overlap}}},
+          {"slices", slices},
+          {"missed", v.missed()},
+          {"reached_per_silhouette", v.reached_per_silhouette()},
+          {"hit_rate", v.hits.mean},
+          {"hit_rate_stderr", v.hits.standard_error},
+          {"by_depth", depths}};
+}
+
+void print_table(std::span<const RejectVariant> variants) {
+  Table table({{"method", true},
+               {"node's edges"},
+               {"rejected"},
+               {"accepted"},
+               {"false positives"},
+               {"reached per silhouette"},
+               {"acceptance rate"}});
+  for (const RejectVariant& v : variants) {
+    Table::Row row{v.name, std::to_string(v.node.end - v.node.begin)};
+    VerdictCounts sum{};  // of both slices
+    for (const VerdictCounts& slice : v.slices) {
+      for (int k = 0; k < kVerdicts; ++k) sum[k] += slice[k];
+    }
+    for (int k = 0; k + 1 < kVerdicts; ++k) {
+      const double share = static_cast<double>(sum[k]) / static_cast<double>(points_of(sum));
+      row.push_back(fmt::format("{:.2f} %", 100 * share));
+    }
+    row.push_back(fmt::format("{:.2f}", v.reached_per_silhouette()));
+    row.push_back(fmt::format("{:.4f} +- {:.4f}", v.hits.mean, v.hits.standard_error));
+    table.add(std::move(row));
+  }
+  fmt::print("\n{}", table.text());
+}
+
 // ---- The run.
-
-// About z.
-Vec3d turned(const Vec3d& v, double degrees) {
-  const double c = std::cos(degrees * kPi / 180), s = std::sin(degrees * kPi / 180);
-  return {c * v.x - s * v.y, s * v.x + c * v.y, v.z};
-}
-
-// The pictures' colours, for legends.
-json colors_json() {
-  json colors = {{"edge_silhouette", css(kSilhouetteColor)},
-                 {"edge_false_accept", css(kFalseAcceptColor)},
-                 {"edge_false_positive", css(kDeadEndColor)},
-                 {"node", css(kNodeColor)},
-                 {"point", css(kPointColor)}};
-  const char* verdicts[] = {"true_reject", "true_accept", "false_accept", "missed"};
-  for (int k = 0; k < kVerdicts; ++k) colors[verdicts[k]] = css(kVerdictColors[k]);
-  return colors;
-}
 
 class Rejection {
  public:
@@ -137,19 +221,19 @@ class Rejection {
         progress_(progress_bar("reject", common.quiet)) {
     input_.objects.push_back(keep_one_shape(scene_, command.shape));
     tracer_ = make_embree_tracer(scene_, threads_);
-    sphere_ = sphere_around(input_.objects[0]);
     seed_ = common.run.seed.value_or(scene_.seed);
     queries_ = queries_around(input_.objects[0], command.points, seed_);
   }
 
   int run() {
-    measure_all();
-    if (measured_.empty()) {
+    for (const EdgeSamplerType& type : types_) {
+      if (!measure(type)) break;
+    }
+    if (variants_.empty()) {
       fmt::print(stderr, "\ninterrupted before the first method was done: nothing is written\n");
       return kInterrupted;
     }
-    for (const Measured& method : measured_) write(method, draw(method));
-    write_png(file("overview.png"), draw_overview(), 1);
+    if (progress_ && is_done()) progress_(1);
     write_figures();
     if (!common_.quiet) print();
     if (command_.report) write_report(command_.output, common_.quiet);
@@ -159,9 +243,9 @@ class Rejection {
  private:
   std::string file(const std::string& name) const { return command_.output + "/" + name; }
   const EdgeMesh& mesh() const { return input_.objects[0]; }
-  Subject subject() const { return {scene_, *tracer_, input_, threads_}; }
+  bool is_done() const { return variants_.size() == types_.size(); }
 
-  // The first method chooses the node, and with it the places that all are looked at.
+  // The first method chooses the node, and with it the slices that all are looked at in.
   void choose_places(const RejectionTree& tree) {
     const size_t count = tree.nodes().size();
     if (count == 0) throw InputError({common_.scene}, "the mesh has no edges");
@@ -173,149 +257,80 @@ class Rejection {
     const auto edges = tree.edges(node_);
     node_edges_.assign(edges.begin(), edges.end());
     node_depth_ = tree.nodes()[node_].depth;
-    patch_ = patch_of(input_, edges);
-    slices_ = slices_around(patch_, command_.extent * sphere_.radius,
-                            command_.distance * sphere_.radius, command_.size);
-    choose_view();
+    const double radius = radius_of(mesh());
+    slices_ = slices_around(patch_of(input_, edges), command_.extent * radius,
+                            command_.distance * radius, command_.size);
   }
 
-  // In front of the narrower side, a little above.
-  Vec3d default_point(const Frame& around) const {
-    double s_extent = 0, t_extent = 0;
-    for (const Vec3d& x : mesh().positions) {
-      s_extent = std::max(s_extent, std::fabs(dot(x - sphere_.center, around.s)));
-      t_extent = std::max(t_extent, std::fabs(dot(x - sphere_.center, around.t)));
-    }
-    const Vec3d narrow = s_extent < t_extent ? Vec3d{1, 0, 0.4} : Vec3d{0, 1, 0.4};
-    const Vec3d direction = normalize(around.to_world(turned(narrow, -15)));
-    return sphere_.center + direction * (1.25 * sphere_.radius);
-  }
-
-  void choose_view() {
-    const Frame around(normalize(command_.up));
-    point_ = command_.point.value_or(default_point(around));
-    const Vec3d to_point = point_ - sphere_.center;
-    const double distance = length(to_point);
-    // A little aside from the point, so that the outline that it sees lies across the picture.
-    Vec3d aside = turned(around.to_local(distance > 0 ? to_point / distance : around.s), 40);
-    aside.z = 0.35;
-    const Vec3d view = command_.view.value_or(around.to_world(aside));
-    // Mesh and point; the mesh alone if the point is far.
-    std::vector<Vec3d> shown = mesh().positions;
-    if (distance < 3 * sphere_.radius) shown.push_back(point_);
-    const Camera camera = camera_for(shown, view, command_.up, command_.size);
-    reach_view_.emplace(scene_, *tracer_, camera, threads_);
-    clay_ = reach_view_->picture();
-  }
-
-  // One method: its tree, what was found, and the verdicts over the slices.
-  struct Measured {
-    std::unique_ptr<EdgeSampler> sampler;
-    std::unique_ptr<RejectionTree> tree;
-    RejectVariant figures;
-    std::vector<PlacedSlice> slices;
-  };
-
-  void measure_all() {
-    for (const EdgeSamplerType& type : types_) {
-      std::optional<Measured> method = measure(type);
-      if (!method) break;
-      measured_.push_back(std::move(*method));
-    }
-    if (progress_ && is_done()) progress_(1);
-  }
-
-  // Nothing if interrupted.
-  std::optional<Measured> measure(const EdgeSamplerType& type) {
-    Measured method;
-    method.sampler = type.make(input_, threads_);
-    method.tree = method.sampler->rejection_tree();
-    const RejectionTree& tree = *method.tree;
-    if (node_edges_.empty()) choose_places(tree);
-    RejectVariant& v = method.figures;
+  // False if interrupted.
+  bool measure(const EdgeSamplerType& type) {
+    const std::unique_ptr<EdgeSampler> sampler = type.make(input_, threads_);
+    const std::unique_ptr<RejectionTree> tree = sampler->rejection_tree();
+    if (node_edges_.empty()) choose_places(*tree);
+    RejectVariant v;
     v.name = type.name;
     v.description = type.description;
-    v.match = best_match(input_, tree, node_edges_);
-    v.node = tree.nodes()[v.match.node];
+    v.match = best_match(input_, *tree, node_edges_);
+    v.node = tree->nodes()[v.match.node];
+    std::vector<std::vector<NodeVerdict>> verdicts;
     for (const Slice& slice : slices_) {
-      method.slices.push_back({slice, judge_slice(input_, tree, v.match.node, slice, threads_)});
-      v.slices.push_back(count(method.slices.back().verdicts));
-      if (!go_on(0.2 * static_cast<double>(method.slices.size()))) return std::nullopt;
+      verdicts.push_back(judge_slice(input_, *tree, v.match.node, slice, threads_));
+      v.slices.push_back(count(verdicts.back()));
+      if (!go_on(0.4 * static_cast<double>(v.slices.size()))) return false;
     }
-    v.reach = reach_from(input_, tree, point_);
-    v.counts = count_reach(input_, tree, queries_, threads_);
-    if (!go_on(0.8)) return std::nullopt;
-    v.hits = acceptance_rate(*method.sampler, queries_, kDraws, seed_, threads_);
-    if (!go_on(0.95)) return std::nullopt;
-    return method;
+    v.counts = count_reach(input_, *tree, queries_, threads_);
+    if (!go_on(0.9)) return false;
+    v.hits = acceptance_rate(*sampler, queries_, kDraws, seed_, threads_);
+    if (!go_on(0.95)) return false;
+    for (size_t i = 0; i < verdicts.size(); ++i)
+      write_png(file(v.slice_file(i)), picture(slices_[i], verdicts[i]), 1);
+    if (chart_.is_null()) chart_ = chart_json(type.name, *tree, v.match.node);
+    variants_.push_back(std::move(v));
+    return true;
   }
 
-  struct Pictures {
-    std::vector<Image> slices;
-    Image edges;
-  };
-  Pictures draw(const Measured& method) const {
-    const RejectVariant& v = method.figures;
-    Pictures pictures;
-    for (const auto& [slice, verdicts] : method.slices)
-      pictures.slices.push_back(
-          slice_picture(subject(), *method.tree, v.match.node, slice, verdicts));
-    pictures.edges = reach_picture(*reach_view_, clay_, mesh(), v.reach, point_);
-    return pictures;
+  // A colour for each verdict, darker inside of the mesh.
+  Image picture(const Slice& slice, const std::vector<NodeVerdict>& verdicts) const {
+    Image image(slice.size, slice.size, 3);
+    parallel_for(slice.size, threads_, [&](size_t y) {
+      for (int x = 0; x < slice.size; ++x) {
+        const size_t i = y * slice.size + x;
+        const double light = is_inside(slice, x, static_cast<int>(y)) ? 0.72 : 1;
+        for (int c = 0; c < 3; ++c) {
+          const uint32_t byte = kVerdictColors[static_cast<int>(verdicts[i])] >> (16 - 8 * c) & 255;
+          image.data[3 * i + c] = static_cast<float>(light * srgb_decode(byte / 255.0));
+        }
+      }
+    });
+    return image;
   }
-
-  void write(const Measured& method, const Pictures& pictures) const {
-    const std::string& name = method.figures.name;
-    for (size_t i = 0; i < pictures.slices.size(); ++i)
-      write_png(file(slice_file(name, i)), pictures.slices[i], 1);
-    write_png(file(edges_file(name)), pictures.edges, 1);
+  // In a closed mesh: what a ray meets first is seen from behind.
+  bool is_inside(const Slice& slice, int x, int y) const {
+    if (!mesh().one_sided_closed) return false;
+    const Ray ray{slice.point(x + 0.5, y + 0.5), normalize(cross(slice.right, slice.up))};
+    Hit hit;
+    return tracer_->closest(ray, hit) && dot(mesh().plane(hit.face.face).n, ray.direction) > 0;
   }
-
-  bool is_done() const { return measured_.size() == types_.size(); }
 
   // Shows how much of the current method is done; false if interrupted.
   bool go_on(double part) const {
     if (progress_)
-      progress_((static_cast<double>(measured_.size()) + part) /
+      progress_((static_cast<double>(variants_.size()) + part) /
                 static_cast<double>(types_.size()));
     return !interrupt_flag().load();
   }
 
-  // With the verdicts of the first method.
-  Image draw_overview() const {
-    std::vector<Vec3d> shown = mesh().positions;
-    for (const Slice& slice : slices_)
-      for (int k = 0; k < 4; ++k)
-        shown.push_back(slice.point(k % 2 * slice.size, k / 2 * slice.size));
-    const Vec3d view = patch_.across * 0.75 + patch_.bend * 0.6 + patch_.normal * 0.35;
-    const Camera camera = camera_for(shown, view, command_.up, command_.size);
-    return overview_picture({scene_, *tracer_, camera, threads_}, mesh(), node_edges_,
-                            measured_[0].slices);
-  }
-
-  std::vector<RejectVariant> variants() const {
-    std::vector<RejectVariant> all;
-    for (const Measured& method : measured_) all.push_back(method.figures);
-    return all;
-  }
-
-  // Of the chosen node, by the first method that has one.
-  json chart_json() const {
-    for (const Measured& method : measured_) {
-      const auto* tree = dynamic_cast<const ChartedTree*>(method.tree.get());
-      const auto chart = tree ? tree->chart(method.figures.match.node) : std::nullopt;
-      if (!chart) continue;
-      json edges = json::array();
-      for (const auto& [a, b] : chart->edges) edges.push_back({to_json(a), to_json(b)});
-      return {{"method", method.figures.name},
-              {"linear", chart->linear},
-              {"square", chart->square},
-              {"product", chart->product},
-              {"low", chart->low},
-              {"high", chart->high},
-              {"edges", edges}};
-    }
-    return nullptr;
+  // The quadrics of the node, if the method has them.
+  static json chart_json(const std::string& method, const RejectionTree& tree, uint32_t node) {
+    const auto* charted = dynamic_cast<const ChartedTree*>(&tree);
+    const auto chart = charted ? charted->chart(node) : std::nullopt;
+    if (!chart) return nullptr;
+    json edges = json::array();
+    for (const auto& [a, b] : chart->edges) edges.push_back({to_json(a), to_json(b)});
+    return {{"method", method},        {"linear", chart->linear},
+            {"square", chart->square}, {"product", chart->product},
+            {"low", chart->low},       {"high", chart->high},
+            {"edges", edges}};
   }
 
   void write_figures() const {
@@ -327,29 +342,28 @@ class Rejection {
         {"edges", mesh().edges.size()},
         {"seed", seed_},
         {"variants", json::array()},
-        {"overview", "overview.png"},
         {"node", {{"index", node_}, {"depth", node_depth_}, {"edges", node_edges_.size()}}},
-        {"point", to_json(point_)},
         {"points", queries_.size()},
-        {"colors", colors_json()},
-        {"chart", chart_json()},
+        {"chart", chart_},
         {"status", is_done() ? "done" : "interrupted"}};
-    for (const RejectVariant& v : variants()) report["variants"].push_back(to_json(v));
+    for (int k = 0; k < kVerdicts; ++k)
+      report["colors"][kVerdictNames[k]] = fmt::format("#{:06x}", kVerdictColors[k]);
+    for (const RejectVariant& v : variants_) report["variants"].push_back(to_json(v));
     write_json(file("reject.json"), report.dump(2));
   }
 
   void print() const {
     fmt::print("{}: {} edges; node {} of {}, at depth {}, has {}\n", common_.scene,
                mesh().edges.size(), node_, types_[0].name, node_depth_, node_edges_.size());
-    print_table(variants());
+    print_table(variants_);
   }
 
   int status() const {
     int result = is_done() ? kSuccess : kInterrupted;
     if (result == kInterrupted)
-      fmt::print(stderr, "interrupted: {} of {} methods are done\n", measured_.size(),
+      fmt::print(stderr, "interrupted: {} of {} methods are done\n", variants_.size(),
                  types_.size());
-    for (const RejectVariant& variant : variants()) {
+    for (const RejectVariant& variant : variants_) {
       if (variant.missed() == 0) continue;
       fmt::print(
           stderr,
@@ -370,18 +384,51 @@ class Rejection {
   std::function<void(double)> progress_;
   EdgeSamplerInput input_;
   std::unique_ptr<RayTracer> tracer_;
-  Sphere sphere_;
   uint64_t seed_ = 0;
   std::vector<EdgeQuery> queries_;
   uint32_t node_ = 0, node_depth_ = 0;
   std::vector<EdgeRef> node_edges_;
-  Patch patch_;
   std::array<Slice, 2> slices_;
-  Vec3d point_;
-  std::optional<MeshView> reach_view_;
-  Image clay_;
-  std::vector<Measured> measured_;
+  std::vector<RejectVariant> variants_;
+  json chart_;
 };
+
+void add_reject_options(CLI::App& app, RejectCommand& command) {
+  app.add_option("-o,--output", command.output, "Folder for pictures, figures and report")
+      ->required()
+      ->type_name("FOLDER");
+  app.add_option("--methods", command.methods,
+                 "Edge samplers to examine; the first one's tree chooses the node")
+      ->delimiter(',')
+      ->capture_default_str();
+  app.add_option("--shape", command.shape,
+                 "Id of the shape to examine (default: the shape with the most edges)");
+  app.add_option(
+         "--node-edges", command.node_edges,
+         "Choose a node of about this many edges that is accepted about as often as rejected")
+      ->check(within(1, 1 << 30))
+      ->capture_default_str();
+  app.add_option(
+         "--node", command.node,
+         "Number of the node to examine in the first method's tree, in place of --node-edges")
+      ->check(within(0, 1u << 31));
+  app.add_option("--extent", command.extent, "Half-width of the slices, in radii of the mesh")
+      ->check(within(1e-3, 1e3))
+      ->capture_default_str();
+  app.add_option("--distance", command.distance, "Distance of the slices, in radii of the mesh")
+      ->check(within(0.0, 1e3))
+      ->capture_default_str();
+  app.add_option("--size", command.size, "Width and height of pictures, in pixels")
+      ->check(within(16, 8192))
+      ->capture_default_str();
+  app.add_option(
+         "--points", command.points,
+         "Points around the mesh from which acceptance rates and counts by depth are measured")
+      ->check(within(2, 1 << 24))
+      ->capture_default_str();
+  app.add_flag_callback(
+      "--no-report", [&] { command.report = false; }, "Write no report.html");
+}
 
 class RejectProgram final : public Command {
  public:

@@ -41,15 +41,6 @@ SLICES = {
     "false_accept": ("false positive", "#f28e2b"),
     "missed": ("missed (false negative)", "#d6006e"),
 }
-EDGES = {
-    "edge_silhouette": ("silhouettes", "#2f6fb7"),
-    "edge_false_accept": ("reachable, no silhouettes", "#f28e2b"),
-    "edge_dead_end": ("in nodes without reachable edges", "#f8d3a6"),
-    "node": ("of the chosen node", "#b3261e"),
-    "point": ("shading point", "#202020"),
-}
-
-
 class Palette:
     """Methods to colours, for a whole page. A chart is drawn with `ink(name)`, a stand-in that
     `page_colours` turns into the CSS variable `variable(name)`, which follows light and dark mode.

@@ -56,7 +56,7 @@ READING = {
          " as seen from there. Grey: true negative. Blue: true positive. Orange: false positive,"
          " which costs time and samples. Red: a silhouette lost; there must be none."),
         ("Reachable edges",
-         "Edges that a descent from one shading point can end on. Those that are no silhouettes are"
+         "Edges that a descent from a shading point can end on. Those that are no silhouettes are"
          " wasted."),
         ("Acceptance rate",
          "Share of descents that end on a true silhouette, over shading points around the whole"

@@ -1,7 +1,7 @@
-"""The section of one reject.json: slices, reachable edges, rates."""
+"""The section of one reject.json: slices, rates."""
 
 from . import charts
-from .colours import EDGES, SLICES
+from .colours import SLICES
 from .markup import count, details, element, hint, notice, percent, plural, share, table
 from .section import Section, legend, status_notice, stem, swatch
 
@@ -45,15 +45,12 @@ class RejectionSection(Section):
                       f" it: {'; '.join(wrong)}.", danger=True) if wrong else None
 
     def slices(self):
-        """The mesh, then a card per variant: its slices, and the edges that a point reaches."""
-        overview = self.figure(self.data.text("overview"), "mesh, chosen node and slices in space",
-                               "mesh, chosen node, slices")
-        cards = [self.card("overview", overview)] + [self._card(v) for v in self.variants]
+        """A card per variant: its slices."""
+        cards = [self._card(v) for v in self.variants]
         drawn = self.data.record_or_none("colors")  # that the program says it drew with
-        legends = [legend(((swatch(drawn.text(key, colour) if drawn else colour), label)
-                           for key, (label, colour) in entries.items()), f"{title}:  ")
-                   for title, entries in (("Slices", SLICES), ("Edges", EDGES))]
-        return self.gallery(cards, *legends, wide=True)
+        keys = legend((swatch(drawn.text(key, colour) if drawn else colour), label)
+                      for key, (label, colour) in SLICES.items())
+        return self.gallery(cards, keys, wide=True)
 
     def _card(self, variant):
         name, shown = variant.text("name"), []
@@ -64,30 +61,22 @@ class RejectionSection(Section):
             if s.number("missed"):
                 caption += f"; {count(s.number('missed'))} missed"
             shown.append(self.figure(s.text("picture"), f"slice {i} of {name}", caption))
-        shown.append(self.figure(
-            variant.text("edges_picture"), f"reachable edges of {name}",
-            f"{count(variant.number('reachable_edges'))} edges reachable,"
-            f" {count(variant.number('silhouettes'))} silhouettes"))
         return self.card(self.name(variant, "h4"), *shown)
 
     def rates(self):
-        head = ["variant", "acceptance rate", "reachable edges", "silhouettes", "false positives",
-                "reachable per silhouette",
+        head = ["variant", "acceptance rate", "reachable per silhouette",
                 *(f"{label}, all slices" for label, _ in SLICES.values()), "description"]
         rows = []
         for v in self.variants:
             slices = v.records("slices")
             points = sum(s.number("points") or 0 for s in slices)
-            silhouettes = v.number("silhouettes")
             rows.append([
                 self.name(v), percent(v.number("hit_rate"), v.number("hit_rate_stderr")),
-                *(count(v.number(k)) for k in ("reachable_edges", "silhouettes", "false_accepts")),
-                f"{v.number('reachable_edges') / silhouettes:.2f}" if silhouettes else "–",
+                f"{v.number('reached_per_silhouette'):.2f}",
                 *(share(sum(s.number(k) or 0 for s in slices), points) for k in SLICES),
                 element("td", v.text("description", ""), class_="words")])
-        note = hint("Reachable edges, silhouettes and false positives belong to one shading point,"
-                    " the one of the edge pictures; a descent draws one edge. The fewer edges are"
-                    " reachable per silhouette, the better the rejection.")
+        note = hint("Edges where a descent can end, per silhouette among them, over all points: the"
+                    " fewer, the better the rejection. A descent draws one edge.")
         return element("div", table(head, rows, f"Rates, {self.title}"), note)
 
     def _by_depth(self):

@@ -43,11 +43,10 @@ struct DepthCounts {
 
 // Everything that descents from one point can reach if they visit all accepted nodes.
 struct Reach {
-  std::vector<EdgeRef> silhouettes;      // reachable edges in E(p)
-  std::vector<EdgeRef> false_accepts;    // reachable edges not in E(p)
-  std::vector<EdgeRef> false_positives;  // in accepted nodes whose children are all rejected
-  std::vector<EdgeRef> missed;           // unreachable edges in E(p)
-  std::vector<DepthCounts> by_depth;     // [0] is depth 1
+  std::vector<EdgeRef> silhouettes;    // reachable edges in E(p)
+  std::vector<EdgeRef> false_accepts;  // reachable edges not in E(p)
+  std::vector<EdgeRef> missed;         // unreachable edges in E(p)
+  std::vector<DepthCounts> by_depth;   // [0] is depth 1
 };
 Reach reach_from(const EdgeSamplerInput& input, const RejectionTree& tree, const Vec3d& p);
 
