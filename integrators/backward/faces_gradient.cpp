@@ -14,11 +14,11 @@ namespace limn {
 
 FacesGradient::FacesGradient(const Scene& scene, const Image& adjoint,
                              const BackwardOptions& options, int threads)
-    : adjoint_((check_still(scene, kFacesUser.name, reverse_parameters(scene, options)),
-                check_faces_film(scene), adjoint_pixels(scene, adjoint))),
+    : adjoint_((check_still(scene, kRegionsUser, reverse_parameters(scene, options)),
+                PixelRegions::check(scene), adjoint_pixels(scene, adjoint))),
       parameters_(scene, reverse_parameters(scene, options)),
       faces_(std::make_shared<CoincidentFaces>(parameters_.scene(), threads)),
-      pixels_(parameters_.scene(), *faces_, threads, kFacesUser),
+      pixels_(parameters_.scene(), *faces_, threads),
       traced_(parameters_.scene(), threads, {.closed = true, .faces = faces_}) {
   selected_terms({kFacesTerm}, options.terms, scene.file);
 }
@@ -75,8 +75,13 @@ bool FacesGradient::trace(const PixelParts& parts, size_t i, const Rgb<double>& 
   RayCount rays;
   PathTracer<Var, NoVisitor> tracer(traced_.context(), rays);
   Walk<Var, NoVisitor> walk(Rng(0, 0, 0), 0, nullptr);
-  const StartRay<Var> start{{}, ray.origin, ray.direction};
-  tracer.follow_rays({&start, 1}, {&part.face, 1}, {&walk, 1});
+  if (part.face.shape.valid()) {
+    const auto surface = surface_on_ray<Var>(scene(), part.face, ray.origin, ray.direction);
+    tracer.place(walk, surface, -ray.direction);
+    tracer.follow_one(walk);
+  } else {
+    walk.sums.radiance = tracer.escaped(ray.direction, 0);
+  }
   const Rgb<Var> sum = walk.sums.radiance * part.area;
   if (walk.failed || !is_finite(value(sum))) return false;
   tape.start();

@@ -263,7 +263,6 @@ class Checker {
     gradient_options.samples = options_.samples;
     gradient_options.warp = options_.warp;
     if (blur_) gradient_options.blur = *blur_;
-    gradient_options.exact_film = options_.exact_film;
     return gradient_options;
   }
 
@@ -508,7 +507,6 @@ CheckResult check(const Scene& scene, const CheckOptions& options, const RunSett
   // Before the search for a step.
   check_task(method, Task::kGradient);
   if (method->check) method->check(scene);
-  if (options.exact_film) check_exact_film(scene, method);
   check_warp(options.warp, {method});
   check_blur(options.blur, {method});
   const Parameter parameter = find_parameter(scene, options.parameter);

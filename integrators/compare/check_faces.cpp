@@ -44,7 +44,6 @@ GradientOptions gradient_options(const CheckOptions& options) {
   gradient.parameters = {options.parameter};
   gradient.method = options.method;
   gradient.terms = options.terms;
-  gradient.exact_film = options.exact_film;
   gradient.points = FilmPoints::kFaces;
   return gradient;
 }

@@ -21,7 +21,6 @@ class ImageRuns final : public TimedMethod {
       : scene_(scene), options_(std::move(options)), block_(block) {
     check_task(method, Task::kImage);
     options_.method = method;
-    if (looks_around() || method->blurs) options_.exact_film = false;
     if (!method->blurs) options_.blur = {};
   }
 
@@ -61,7 +60,7 @@ class ImageRuns final : public TimedMethod {
       return {{"lines", double(options_.lines)}, {"tolerance", options_.tolerance}};
     }
     if (looks_around()) return {{"rays", double(options_.rays)}};
-    return {{"generator", options_.generator}, {"film", options_.exact_film ? "exact" : "rays"}};
+    return {{"generator", options_.generator}};
   }
 
  private:
@@ -96,7 +95,6 @@ std::unique_ptr<TimedMethod> make_image_method(const Scene& scene, RenderOptions
 
 Reference make_image_reference(const Scene& scene, RenderOptions options, int block,
                                const RunSettings& settings, std::string& not_by_rays) {
-  options.exact_film = false;
   std::unique_ptr<TimedMethod> method;
   try {
     method = make_image_method(scene, options, "rays", block, settings);

@@ -192,9 +192,7 @@ Reference make_reference(const MethodInput& input, const RunSettings& settings) 
   const Method method(Task::kCompare);
   RunSettings at_least_two = settings;
   at_least_two.least_spp = 2;  // for variances
-  GradientOptions options = input.options(method);
-  options.exact_film = false;
-  const GradientResult result = gradient(input.scene, options, at_least_two);
+  const GradientResult result = gradient(input.scene, input.options(method), at_least_two);
   const ParameterGradient& g = result.parameters[0];
   Reference r;
   r.image = means(g.total);

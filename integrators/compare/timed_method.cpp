@@ -29,7 +29,6 @@ class TableMethod final : public TimedMethod {
     }
     run.non_finite = result.non_finite;
     settings_ = std::move(result.settings);
-    if (options.exact_film) settings_.push_back({"film", "exact"});
     return run;
   }
 
@@ -53,7 +52,6 @@ GradientOptions MethodInput::options(const Method& method) const {
   if (method->warps) options.warp = warp;
   if (method->blurs) options.blur = blur;
   options.block = block;
-  options.exact_film = exact_film && method->terms_can_be_left_out;
   return options;
 }
 

@@ -21,9 +21,6 @@
 
 namespace limn {
 
-// How far regions reach beyond a pixel [pixels]: a step of their grid.
-inline constexpr double kPixelMargin = 0x1p-30;
-
 // The visible part of a face in a pixel, in one piece or several.
 template <class S>
 struct FacePart {
@@ -35,7 +32,6 @@ struct FacePart {
 // Of one pixel at a time.
 class PixelParts {
  public:
-  // pixels: those of a user with the margin kPixelMargin.
   PixelParts(const Scene& scene, const PixelRegions& pixels)
       : scene_(scene), pixels_(pixels), view_(scene.camera), plane_(view_.plane(0, 0)) {}
 

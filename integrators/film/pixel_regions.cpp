@@ -26,6 +26,8 @@ PlaneView view_of(const Camera& camera) {
   return {value(camera.origin), u, v, a, camera.near_clip, camera.far_clip};
 }
 
+constexpr const char* kInstead = "points \"random\"";
+
 constexpr size_t kChunk = 4096;  // faces at a time; not tuned
 // Of a pixel: a hundred megabytes. Thin faces behind each other, all over one pixel, make as many
 // as their number squared.
@@ -88,28 +90,26 @@ class PixelLists {
 
 }  // namespace
 
-void PixelRegions::check(const Scene& scene, const RegionsUser& user) {
+void PixelRegions::check(const Scene& scene) {
   const Film& film = scene.film;
-  check_still(scene, user.name);
+  check_still(scene, kRegionsUser);
   if (!scene.camera.is_pinhole()) {
     throw InputError({scene.file},
                      fmt::format("{} needs a pinhole, a sensor of type \"perspective\" ({} takes "
                                  "every sensor)",
-                                 user.name, user.instead));
+                                 kRegionsUser, kInstead));
   }
   if (film.filter.kind == Filter::Kind::kBox && film.filter.radius == 0.5) return;
   throw InputError(film.where,
                    fmt::format("{} needs a box filter, <rfilter type=\"box\"/>: a pixel is what is "
                                "seen within it ({} takes every filter)",
-                               user.name, user.instead));
+                               kRegionsUser, kInstead));
 }
 
-PixelRegions::PixelRegions(const Scene& scene, const CoincidentFaces& faces, int threads,
-                           const RegionsUser& user)
-    : scene_((check(scene, user), scene)),
+PixelRegions::PixelRegions(const Scene& scene, const CoincidentFaces& faces, int threads)
+    : scene_((check(scene), scene)),
       copies_(faces.copies),
       overlaps_(faces.overlaps),
-      user_(user),
       view_(view_of(scene.camera)),
       tiles_(make_tiles(scene.film)) {
   for (const Shape& shape : scene.shapes) {
@@ -139,7 +139,7 @@ bool PixelRegions::for_each_pixel(size_t t, const std::atomic<bool>* interrupted
     for (int x = tile.x0; x < tile.x1; ++x) {
       if (interrupted && interrupted->load(std::memory_order_relaxed)) return false;
       if (!wanted(x, y)) continue;
-      regions.reset({{x + 0.5, y + 0.5}, 0.5 + user_.margin, 0.5 + user_.margin});
+      regions.reset({{x + 0.5, y + 0.5}, 0.5 + kPixelMargin, 0.5 + kPixelMargin});
       for (const auto& [f, nearest] : lists.of(x, y)) {
         if (!ruled && nearest < regions.hidden_below()) break;
         regions.insert(faces[f]);
@@ -184,7 +184,7 @@ std::optional<bool> PixelRegions::rule(uint32_t a, uint32_t b) const {
 void PixelRegions::refuse(int x, int y) const {
   throw InputError(scene_.film.where,
                    fmt::format("{}: pixel ({}, {}) shows more than {} regions ({} takes it)",
-                               user_.name, x, y, kMostRegions, user_.instead));
+                               kRegionsUser, x, y, kMostRegions, kInstead));
 }
 
 // Whether a ray from the camera can meet the face: of faces in one place one alone.

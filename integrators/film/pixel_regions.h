@@ -15,19 +15,17 @@
 
 namespace limn {
 
-// Who needs them, for messages: "the exact film", and what takes every film: "--film rays".
-struct RegionsUser {
-  const char *name, *instead;
-  double margin = 0;  // by which a pixel's regions reach beyond it on all sides [pixels]
-};
+// How far regions reach beyond a pixel [pixels]: a step of their grid.
+inline constexpr double kPixelMargin = 0x1p-30;
+// What needs them, for messages.
+inline constexpr const char* kRegionsUser = "a film seen by its faces";
 
 class PixelRegions {
  public:
   // Finds which faces may be seen in which tile of make_tiles(). Scene and faces must outlive it.
   // InputError unless the filter is a box, with its place, and the camera a pinhole.
-  PixelRegions(const Scene& scene, const CoincidentFaces& faces, int threads,
-               const RegionsUser& user);
-  static void check(const Scene& scene, const RegionsUser& user);
+  PixelRegions(const Scene& scene, const CoincidentFaces& faces, int threads);
+  static void check(const Scene& scene);
 
   const std::vector<Tile>& tiles() const { return tiles_; }
   // Which of tiles() a pixel of the crop is in.
@@ -54,7 +52,6 @@ class PixelRegions {
   const Scene& scene_;
   const DuplicateFaces& copies_;
   const FaceOverlaps& overlaps_;
-  RegionsUser user_;
   PlaneView view_;
   std::vector<Tile> tiles_;
   std::vector<uint32_t> first_label_;  // of each shape: labels are faces, counted through

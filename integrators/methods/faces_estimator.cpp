@@ -12,8 +12,6 @@
 
 namespace limn {
 
-void check_faces_film(const Scene& scene) { PixelRegions::check(scene, kFacesUser); }
-
 struct FacesEstimator::Group {
   // all: the scene without the group's tangents.
   Group(const PathContext& all, std::span<const Parameter> parameters)
@@ -33,10 +31,10 @@ struct FacesEstimator::Group {
 
 FacesEstimator::FacesEstimator(const Scene& scene, std::span<const Parameter> parameters,
                                int threads)
-    : scene_((check_still(scene, kFacesUser.name, parameters), check_faces_film(scene), scene)),
+    : scene_((check_still(scene, kRegionsUser, parameters), PixelRegions::check(scene), scene)),
       lanes_(static_cast<int>(std::min<size_t>(parameters.size(), kLanes))),
       faces_(std::make_shared<CoincidentFaces>(scene, threads)),
-      pixels_(scene, *faces_, threads, kFacesUser),
+      pixels_(scene, *faces_, threads),
       traced_(scene, threads, {.closed = true, .faces = faces_}),
       view_(scene.camera) {
   for (size_t k = 0; k < parameters.size(); k += kLanes) {
@@ -62,8 +60,13 @@ bool FacesEstimator::add_part(const PixelParts& parts, size_t i, const Scene& sc
   RayCount rays;
   PathTracer<S, NoVisitor> tracer(context, rays);
   Walk<S, NoVisitor> walk(Rng(0, 0, 0), 0, nullptr);
-  const StartRay<S> start{{}, ray.origin, ray.direction};
-  tracer.follow_rays({&start, 1}, {&part.face, 1}, {&walk, 1});
+  if (part.face.shape.valid()) {
+    const auto surface = surface_on_ray<S>(context.scene, part.face, ray.origin, ray.direction);
+    tracer.place(walk, surface, -ray.direction);
+    tracer.follow_one(walk);
+  } else {
+    walk.sums.radiance = tracer.escaped(ray.direction, 0);
+  }
   sum += walk.sums.radiance * part.area;
   return !walk.failed;
 }

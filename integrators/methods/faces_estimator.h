@@ -15,17 +15,12 @@
 namespace limn {
 
 inline constexpr const char* kFacesTerm = "faces";
-inline constexpr RegionsUser kFacesUser{"a film seen by its faces", "points \"random\"",
-                                        kPixelMargin};
-
-// InputError unless the film has a box filter.
-void check_faces_film(const Scene& scene);
 
 // A pixel has one sample. Slot g holds the derivatives for the parameters from g
 // kLanes on; without parameters there is one slot without derivatives.
 class FacesEstimator final : public SampleEstimator {
  public:
-  // The scene must outlive it. InputError as check_faces_film() and check_closed_light().
+  // The scene must outlive it. InputError as PixelRegions::check() and check_closed_light().
   FacesEstimator(const Scene& scene, std::span<const Parameter> parameters, int threads);
   ~FacesEstimator() override;
 

@@ -52,10 +52,6 @@ GradientResult run_faces(const Scene& scene, const GradientOptions& options,
   const RunSettings settings = settings_for(FilmPoints::kFaces, requested);
   const Stopwatch watch;
   selected_terms({kFacesTerm}, options.terms, scene.file);
-  if (options.exact_film) {
-    throw FieldError("film",
-                     "exact chooses the edges of random points, and points \"faces\" has none");
-  }
   const std::vector<Parameter> parameters = parameters_of(scene, options);
   std::vector<std::unique_ptr<SampleEstimator>> estimators;
   estimators.push_back(std::make_unique<FacesEstimator>(scene, parameters, settings.threads));

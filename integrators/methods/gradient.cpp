@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "integrators/film/film_regions.h"
 #include "integrators/methods/hair_gaps.h"
 #include "integrators/terms/term.h"
 #include "limn/core/error.h"
@@ -33,7 +32,6 @@ void check_selection(const Scene& scene, const GradientOptions& options) {
   check_task(method, Task::kGradient);
   if (options.parameters.empty()) throw InputError("names: at least one parameter must be named");
   check_options(options);
-  if (options.exact_film) check_exact_film(scene, method);
   if (method->check) method->check(scene);
   check_warp(options.warp, {method});
   check_blur(options.blur, {method});
@@ -55,29 +53,10 @@ void identify(const Scene& scene, const GradientOptions& options, BatchStore& st
                                              : to_string(*options.samples));
   store.identify("warp", fmt::format("{} rays, kappa {}", options.warp.rays, options.warp.kappa));
   store.identify("blur", fmt::format("{}, {}", options.blur.sigma, options.blur.gamma));
-  store.identify("film", options.exact_film ? "exact" : "rays");
   store.identify("step", fmt::format("{}", options.step));
 }
 
 }  // namespace
-
-void check_exact_film(const Scene& scene, const Method& method) {
-  if (!method->terms_can_be_left_out) {
-    throw InputError("the exact film is for methods that sample edges on it: the method \"" +
-                     method.name() + "\" does not");
-  }
-  FilmRegions::check(scene);
-}
-
-void check_exact_films(const Scene& scene, const std::vector<Method>& methods) {
-  std::vector<std::string> names;
-  for (const Method& method : methods) {
-    if (method->terms_can_be_left_out) return FilmRegions::check(scene);
-    names.push_back(method.name());
-  }
-  throw InputError("the exact film is for methods that sample edges on it: none of these does: " +
-                   join(names));
-}
 
 bool SampleCounts::operator==(const SampleCounts& other) const {
   for (size_t t = 0; t < std::max(size(), other.size()); ++t) {

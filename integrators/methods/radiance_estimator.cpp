@@ -2,7 +2,6 @@
 #include "integrators/methods/radiance_estimator.h"
 
 #include <array>
-#include <utility>
 #include <vector>
 
 #include "integrators/paths/path_follow.h"
@@ -10,19 +9,14 @@
 
 namespace limn {
 
-RadianceEstimator::RadianceEstimator(const Scene& scene, int threads,
-                                     std::shared_ptr<const FilmRegions> visible, bool closed,
-                                     Numbers numbers)
+RadianceEstimator::RadianceEstimator(const Scene& scene, int threads, bool closed, Numbers numbers)
     : scene_(scene),
-      traced_(scene_, threads, {.closed = closed, .faces = visible ? visible->faces() : nullptr}),
+      traced_(scene_, threads, {.closed = closed}),
       camera_(scene_.camera),
       filter_(scene_.film.filter),
-      visible_(std::move(visible)),
       numbers_(numbers),
       glossy_(is_glossy(scene_)),
-      reach_(numbers == Numbers::kEvenInRun && !closed && !visible_
-                 ? SharedPlace::reach_of(scene_.film)
-                 : 0) {}
+      reach_(numbers == Numbers::kEvenInRun && !closed ? SharedPlace::reach_of(scene_.film) : 0) {}
 
 RadianceEstimator::RadianceEstimator(const Scene& moved, PathChoices& choices, int threads,
                                      Numbers numbers)
@@ -71,16 +65,7 @@ void RadianceEstimator::trace(std::span<const KeyedSample> samples, const FilmRa
       log_camera_ray(*sink.log(), rays.place(i).x, rays.place(i).y, start.origin, start.direction);
     }
   }
-  if (visible_) {
-    std::vector<FaceRef> faces;
-    for (size_t i = 0; i < samples.size(); ++i) {
-      faces.push_back(
-          visible_->face_at(samples[i].at.x, samples[i].at.y, rays.place(i).x, rays.place(i).y));
-    }
-    tracer.follow_rays(rays.starts(), faces, walks);
-  } else {
-    tracer.follow_rays(rays.starts(), walks);
-  }
+  tracer.follow_rays(rays.starts(), walks);
   sink.cost(0).add(count);
   sink.cost(0).samples += samples.size();
   add(walks);

@@ -1,12 +1,10 @@
 #pragma once
 // The radiance of a scene as an estimator: images, and differences of images.
 #include <array>
-#include <memory>
 #include <span>
 #include <vector>
 
 #include "integrators/estimates/shared_place.h"
-#include "integrators/film/film_regions.h"
 #include "integrators/paths/film_rays.h"
 #include "integrators/paths/path.h"
 #include "integrators/paths/traced_scene.h"
@@ -15,10 +13,9 @@ namespace limn {
 
 class RadianceEstimator final : public SharingEstimator {
  public:
-  // The scene must outlive the estimator. visible: what its film shows; null: rays tell. closed:
-  // what surfaces scatter is known in closed form, InputError if it is not.
-  RadianceEstimator(const Scene& scene, int threads,
-                    std::shared_ptr<const FilmRegions> visible = nullptr, bool closed = false,
+  // The scene must outlive the estimator. closed: what surfaces scatter is known in closed form,
+  // InputError if it is not.
+  RadianceEstimator(const Scene& scene, int threads, bool closed = false,
                     Numbers numbers = Numbers::kIndependent);
 
   // The radiance of a scene that has moved, by the choices of the one that has not.
@@ -49,7 +46,6 @@ class RadianceEstimator final : public SharingEstimator {
   TracedScene traced_;
   CameraView<double> camera_;
   FilterTable filter_;
-  std::shared_ptr<const FilmRegions> visible_;
   Numbers numbers_;
   bool glossy_;
   // Errors of neighbours depend on each other where samples are shared, which no variance shows:

@@ -59,30 +59,17 @@ std::unique_ptr<SampleEstimator> make_estimator(const Scene& scene, const RunSet
                     options.method.name(), join(names_looking_around())));
   }
   if (options.points == FilmPoints::kFaces) {
-    if (options.exact_film)
-      throw FieldError("film", "exact is for random points: faces have their own");
     return std::make_unique<FacesEstimator>(scene, std::span<const Parameter>(), settings.threads);
   }
   if (method.looks_around) {
-    if (options.exact_film) {
-      throw FieldError("film", "exact is not for the method \"" + options.method.name() + "\"");
-    }
     return std::make_unique<VisibilityEstimator>(scene, settings, options);
   }
   if (options.method->blurs) {
-    if (options.exact_film) {
-      throw FieldError("film", "exact is not for the method \"" + options.method.name() + "\"");
-    }
     const Blur blur = resolved(options.method->blurred_by(options.blur), scene);
     return std::make_unique<BlurredEstimator>(scene, blur, std::span<const Parameter>(),
                                               settings.threads, numbers);
   }
-  std::shared_ptr<const FilmRegions> visible;
-  if (options.exact_film) {
-    visible = std::make_shared<FilmRegions>(scene, settings.threads, settings.interrupted);
-  }
-  return std::make_unique<RadianceEstimator>(scene, settings.threads, std::move(visible),
-                                             method.closed_light, numbers);
+  return std::make_unique<RadianceEstimator>(scene, settings.threads, method.closed_light, numbers);
 }
 
 // What the method reads of the options: parts that differ elsewhere are of one run.
@@ -92,7 +79,6 @@ void identify(BatchStore& store, const RenderOptions& options) {
   if (!method.looks_around) {
     store.identify("generator", options.generator);
     store.identify("blur", fmt::format("{}, {}", options.blur.sigma, options.blur.gamma));
-    store.identify("film", options.exact_film ? "exact" : "rays");
     return;
   }
   store.identify("what", kRenderWhat[static_cast<int>(options.what)]);

@@ -11,7 +11,6 @@
 #include "integrators/edges/scene_edges.h"
 #include "integrators/edges/texture_discontinuities.h"
 #include "integrators/estimates/batches.h"
-#include "integrators/film/film_regions.h"
 #include "integrators/methods/run_notes.h"
 #include "integrators/methods/selection.h"
 #include "integrators/methods/term_sums.h"
@@ -88,17 +87,12 @@ class TermJob {
         parameters_(find_parameters(scene, options.parameters)),
         moving_(needs_times(scene, parameters_)),
         // What a pilot finds of turns and of positions on the film holds for its own time alone.
-        moves_film_(method.moves_film && !options.exact_film && scene.camera.is_pinhole() &&
-                    !moving_),
+        moves_film_(method.moves_film && scene.camera.is_pinhole() && !moving_),
         types_(terms_of(scene, method.sampler, method.closed, moves_film_)) {
     const std::vector<std::string> chosen = selected_terms(term_names(), options.terms, scene.file);
     if (options.samples) check_samples(*options.samples);
     moved_ = moved_in(scene, parameters_);
     keep_changed(chosen);
-    if (options.exact_film) {
-      check_still(scene, "the exact film", parameters_);
-      visible_ = std::make_shared<FilmRegions>(scene, settings.threads, settings.interrupted);
-    }
     if (moving_) method_.moves_directions = method_.random_directions = false;
     passes_ = passes_at(moving_ ? std::optional(kPilotTime) : std::nullopt, settings.threads);
   }
@@ -157,8 +151,7 @@ class TermJob {
   std::vector<std::unique_ptr<SampleEstimator>> passes_at(const std::optional<double>& time,
                                                           int threads) const {
     const Warping warping{options_.warp, method_.unbiased};
-    const TermExtras extras{visible_, method_.warps ? &warping : nullptr, method_.closed,
-                            moves_film_, time};
+    const TermExtras extras{method_.warps ? &warping : nullptr, method_.closed, moves_film_, time};
     std::vector<std::unique_ptr<SampleEstimator>> passes;
     for (size_t k = 0; k < parameters_.size(); k += kLanes) {
       const auto some =
@@ -564,7 +557,6 @@ class TermJob {
   bool moving_;      // whether samples have times
   bool moves_film_;  // whether positions on the film may move
   mutable std::optional<bool> has_all_edges_;
-  std::shared_ptr<const FilmRegions> visible_;
   Moved moved_;                          // by any of the parameters
   std::vector<const TermType*> types_;   // that can differ from zero
   std::vector<bool> computed_;           // of each term

@@ -71,9 +71,6 @@ class PathTracer {
   // Radiance that arrives at the origins of rays against their directions; rays[i] belongs to
   // walks[i], at most kMostWalks of them. What cannot be traced has `failed`.
   void follow_rays(std::span<const StartRay<Place>> rays, std::span<Walk> walks);
-  // The same where it is known what they meet: faces[i], or none.
-  void follow_rays(std::span<const StartRay<Place>> rays, std::span<const FaceRef> faces,
-                   std::span<Walk> walks);
   Rgb<S> escaped(const Vec3<Place>& direction, int bounces) const;
 
   // A path that starts on a surface: the radiance that leaves it along wi, emission and everything

@@ -49,17 +49,6 @@ inline void PathTracer<S, Visitor>::follow_rays(std::span<const StartRay<Place>>
 }
 
 template <class S, class Visitor>
-inline void PathTracer<S, Visitor>::follow_rays(std::span<const StartRay<Place>> rays,
-                                                std::span<const FaceRef> faces,
-                                                std::span<Walk> walks) {
-  for (size_t i = 0; i < walks.size(); ++i) {
-    walks[i].found = faces[i].shape.valid();
-    walks[i].hit.face = faces[i];
-  }
-  follow_seen(rays, walks);
-}
-
-template <class S, class Visitor>
 inline Rgb<S> PathTracer<S, Visitor>::escaped(const Vec3<Place>& direction, int bounces) const {
   if (!shows_sky(bounces)) return {};
   return environment_radiance<S>(*c_.scene.environment, detail::in_scalar<S>(direction));

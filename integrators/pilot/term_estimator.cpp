@@ -4,7 +4,6 @@
 #include <algorithm>
 
 #include "integrators/edges/scene_edges.h"
-#include "integrators/film/film_regions.h"
 #include "integrators/paths/camera_path.h"
 #include "integrators/paths/path_follow.h"
 #include "integrators/paths/path_log.h"
@@ -66,18 +65,14 @@ TermEstimator::TermEstimator(const Scene& scene, std::span<const Parameter> para
       lanes_(static_cast<int>(parameters.size())),
       lane_scale_(natural_steps(parameters)),
       traced_(scene_, threads,
-              {.closed = extras.closed,
-               .edges = draws_edges(types, changed_) || extras.warping,
-               .faces = extras.visible ? extras.visible->faces() : nullptr}),
+              {.closed = extras.closed, .edges = draws_edges(types, changed_) || extras.warping}),
       camera_(scene_.camera),
       filter_(scene_.film.filter),
-      visible_(extras.visible),
       input_(traced_.context(), lanes_, lane_scale_, sampler, threads, extras.warping != nullptr),
       types_(types),
       moves_film_(extras.moved_film),
       rates_(scene_, lanes_, lane_scale_),
       turning_(turning_about_axes(lane_scale_, lanes_)) {
-  input_.visible = visible_.get();
   for (size_t slot = 0; slot < types_.size(); ++slot) {
     if (types_[slot]->traces_paths) pixel_slot_ = slot;
     terms_.push_back(changed_[slot] ? types_[slot]->make(input_) : nullptr);
@@ -443,7 +438,6 @@ void TermEstimator::warn_of_kinks(std::vector<std::string>& warnings) const {
 
 void TermEstimator::describe(GradientStats& stats) const {
   stats.setup.emplace_back("ray tracer", traced_.tracer_seconds());
-  if (visible_) stats.setup.emplace_back("visible regions", visible_->seconds());
   if (const EdgeSamplerInput* edges = input_.made_edges()) {
     stats.setup.emplace_back("edges", input_.edges_seconds());
     for (const EdgeClass c :

@@ -19,8 +19,6 @@
 
 namespace limn {
 
-class FilmRegions;
-
 // How directions are warped, see warp_field.h.
 struct Warping {
   WarpOptions options;
@@ -29,8 +27,7 @@ struct Warping {
 
 // What few methods have.
 struct TermExtras {
-  std::shared_ptr<const FilmRegions> visible = nullptr;  // of the film
-  const Warping* warping = nullptr;                      // null where directions are not warped
+  const Warping* warping = nullptr;  // null where directions are not warped
   bool closed = false;  // what surfaces scatter is known in closed form, see closed_light.h
   bool moved_film = false;
   std::optional<double> time = {};  // of the shutter, see at_time(); none: the reference time
@@ -149,7 +146,6 @@ class TermEstimator final : public SampleEstimator {
   TracedScene traced_;
   CameraView<Dual> camera_;
   FilterTable filter_;
-  std::shared_ptr<const FilmRegions> visible_;
   TermInput input_;
   std::vector<const TermType*> types_;
   std::vector<std::unique_ptr<Term>> terms_;  // of each slot; null where not computed

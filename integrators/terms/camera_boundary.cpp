@@ -22,8 +22,7 @@ class CameraTerm final : public Term {
     if (has_lens_) {
       edges_ = std::make_unique<LensEdges>(context, input_, input.lanes, input.free);
     } else {
-      edges_ =
-          std::make_unique<CameraEdges>(context, input_, input.lanes, input.free, input.visible);
+      edges_ = std::make_unique<CameraEdges>(context, input_, input.lanes, input.free);
     }
   }
 

@@ -92,8 +92,8 @@ class SpeedAgainstFilm {
 }  // namespace
 
 CameraEdges::CameraEdges(const PathContext& context, const EdgeSamplerInput& input, int lanes,
-                         const FreeMotion* free, const FilmRegions* visible)
-    : FilmEdges(context, input, free), lanes_(free ? 3 : lanes), visible_(visible) {
+                         const FreeMotion* free)
+    : FilmEdges(context, input, free), lanes_(free ? 3 : lanes) {
   const Stopwatch watch;
   list();
   weigh({});
@@ -117,8 +117,6 @@ void CameraEdges::list() {
       for (uint32_t c = 0; c < clips_.size(); ++c) add_clip(c);
     }
     find_in_line(first);
-    // What is seen straight through surfaces is hidden from regions.
-    if (v == 0 && visible_ && !context_.straight_ways) keep_seen(*visible_);
   }
 }
 
@@ -128,38 +126,6 @@ void CameraEdges::find_in_line(size_t first) {
   for (size_t e = 0; e < edges.size(); ++e) edges[e].in_line = found.in_line[e];
   if (!parting_ || first == 0) parting_ = found.parting;
   resting_ = {};
-}
-
-// Lines keep their speeds where they are cut, which change linearly along them. Of edges in one
-// line a place aside sees other parts than the camera, where the regions are.
-void CameraEdges::keep_seen(const FilmRegions& visible) {
-  std::vector<FilmEdge> seen;
-  for (const FilmEdge& edge : edges_) {
-    if (edge.in_line) {
-      seen.push_back(edge);
-      continue;
-    }
-    const bool is_clip = edge.clip != FilmEdge::kNoClip;
-    const FacesAround around = is_clip ? FacesAround{{&clips_[edge.clip].face, 1}, {}}
-                                       : input_.object(edge.id.object).around(edge.id.edge);
-    for (const auto& [s0, s1, beside] :
-         visible.seen_parts({edge.x0, edge.y0}, {edge.x1, edge.y1}, around.all)) {
-      const auto at = [](const auto& a, const auto& b, double s) { return a * (1 - s) + b * s; };
-      const auto depth_at = [&](double s) { return 1 / at(1 / edge.depth0, 1 / edge.depth1, s); };
-      FilmEdge part = edge;
-      part.t0 = at(edge.t0, edge.t1, fraction_in_space(s0, edge.depth0, edge.depth1));
-      part.t1 = at(edge.t0, edge.t1, fraction_in_space(s1, edge.depth0, edge.depth1));
-      part.depth0 = depth_at(s0), part.depth1 = depth_at(s1);
-      part.x0 = at(edge.x0, edge.x1, s0), part.x1 = at(edge.x0, edge.x1, s1);
-      part.y0 = at(edge.y0, edge.y1, s0), part.y1 = at(edge.y0, edge.y1, s1);
-      part.speed0 = at(edge.speed0, edge.speed1, s0);
-      part.speed1 = at(edge.speed0, edge.speed1, s1);
-      part.length = edge.length * (s1 - s0);
-      if (around.near.empty() && !views_[0].viewpoint->sees_edge_on(around)) part.beside = beside;
-      seen.push_back(part);
-    }
-  }
-  edges_ = std::move(seen);
 }
 
 void CameraEdges::add_object(ShapeId object, uint32_t index, const CameraView<Dual>& camera) {

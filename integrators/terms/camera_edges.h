@@ -1,7 +1,6 @@
 #pragma once
 // Edges on the film that are listed once: seen from a pinhole, or along the direction of an
 // orthographic camera, also by way of flat mirrors.
-#include "integrators/film/film_regions.h"
 #include "integrators/terms/film_edges.h"
 #include "limn/core/discrete_distribution.h"
 
@@ -9,10 +8,10 @@ namespace limn {
 
 class CameraEdges final : public FilmEdges {
  public:
-  // As FilmEdges, with the speeds of tangents in `lanes` lanes. visible: of the film, to list only
-  // what is seen of edges; null: hidden parts are listed too, which difference_at then finds.
+  // As FilmEdges, with the speeds of tangents in `lanes` lanes. Hidden parts are listed too, which
+  // difference_at then finds.
   CameraEdges(const PathContext& context, const EdgeSamplerInput& input, int lanes,
-              const FreeMotion* free = nullptr, const FilmRegions* visible = nullptr);
+              const FreeMotion* free = nullptr);
 
   void move_film(const FilmMotionAt& motion) override;
   bool empty() const override { return !(choice_.sum() > 0); }
@@ -45,7 +44,6 @@ class CameraEdges final : public FilmEdges {
   }
   // Of the edges from the first on, of one view.
   void find_in_line(size_t first);
-  void keep_seen(const FilmRegions& visible);
   // What a face around the edge emits, the brightest, as a mean of channels; 0: nothing.
   double emitted_at(const FilmEdge& edge) const;
   // Looks at differences across some edges of emitters and across some others.
@@ -57,7 +55,6 @@ class CameraEdges final : public FilmEdges {
   void add_pieces(uint32_t edge, const FilmMotionAt& motion);
 
   int lanes_;
-  const FilmRegions* visible_;
   bool lists_all_ = false;
   std::vector<FilmEdge> edges_;  // that move, or all
   size_t moving_ = 0;

@@ -181,14 +181,12 @@ Ray ending_on(Ray ray, FaceRef face, double distance) {
 // Starts both sides of an edge inside of a face, where the face's texture is discontinuous. False
 // if the edge is hidden.
 bool start_beside_texture(const PathContext& context, const FacesAround& around,
-                          const EdgeView& view, const Ray& ray, bool known_to_be_seen,
-                          RadianceBeside& beside, RayCount& rays) {
+                          const EdgeView& view, const Ray& ray, RadianceBeside& beside,
+                          RayCount& rays) {
   const FaceRef face = around.faces[0];
   if (ray.skip_emitters && context.scene.shape(face.shape).is_emitter) return false;
-  if (!known_to_be_seen) {
-    ++rays.shadow;
-    if (context.tracer.occluded(ending_on(ray, face, view.distance))) return false;
-  }
+  ++rays.shadow;
+  if (context.tracer.occluded(ending_on(ray, face, view.distance))) return false;
   const FaceSide side = side_of_face(context.scene, face, view.x0, normalize(view.x1 - view.x0));
   const bool positive = dot(side.into, view.side) > 0;
   beside.start_on_face(positive ? 1 : 0, around, side);
@@ -207,8 +205,7 @@ bool difference_in_sight(const PathContext& context, const EdgeMesh& mesh, const
   RadianceBeside beside(context, view, mesh.of_texture(), viewer.bounces,
                         viewer.key.at(Purpose::kEdgeSide, viewer.bounces), rays, part);
   if (mesh.of_texture()) {
-    const bool known = viewer.known_behind != nullptr;
-    if (!start_beside_texture(context, around, view, ray, known, beside, rays)) return false;
+    if (!start_beside_texture(context, around, view, ray, beside, rays)) return false;
     difference = beside.difference();
     return true;
   }
@@ -224,16 +221,10 @@ bool difference_in_sight(const PathContext& context, const EdgeMesh& mesh, const
   }
   fetch_corners(context.scene, around);  // while the ray is traced
   Hit behind;
-  bool found;
-  if (viewer.known_behind) {
-    behind.face = *viewer.known_behind;
-    found = behind.face.shape.valid();
-  } else {
-    ++rays.closest;
-    found =
-        closest_at_edge(context.tracer, context.scene, around, view.y, view.distance, ray, behind);
-    if (found && behind.t < view.distance) return false;
-  }
+  ++rays.closest;
+  const bool found =
+      closest_at_edge(context.tracer, context.scene, around, view.y, view.distance, ray, behind);
+  if (found && behind.t < view.distance) return false;
 
   const Sides sides = nearest_faces(context, mesh, view, ray.skip_emitters);
   for (int i = 0; i < 2; ++i) {

@@ -28,8 +28,6 @@ struct EdgeViewer {
   int bounces;    // how often the path has scattered, p included
   const Rng& key;
   RadiancePart part = {};
-  // y is seen, and what lies behind the edge is this face, or none. Null: a ray finds both.
-  const FaceRef* known_behind = nullptr;
   // Where rays from p begin and end (the clip planes of a camera).
   double t_min = 0, t_max = std::numeric_limits<double>::infinity();
 };

@@ -209,11 +209,9 @@ bool FilmEdges::difference_at(const FilmEdgePoint& point, const Rng& key, RayCou
   EdgeView view;
   if (!view_edge(mesh, edge.id, t, p, view)) return false;
   const double cosine = dot(view.omega, value(camera.forward));
-  const FaceRef* known_behind = edge.beside ? &*edge.beside : nullptr;
-  return edge_difference(
-      context_, mesh, view,
-      {{}, 0, key, {}, known_behind, camera.near_clip / cosine, camera.far_clip / cosine}, rays,
-      difference);
+  return edge_difference(context_, mesh, view,
+                         {{}, 0, key, {}, camera.near_clip / cosine, camera.far_clip / cosine},
+                         rays, difference);
 }
 
 // By way of mirrors the edge is where the camera's image sees it; rays tell what hides it.

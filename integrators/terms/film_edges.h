@@ -25,8 +25,7 @@ struct FilmEdge : FilmLine {
   bool refracted = false;   // a curve: its ends are not on the film
   double t0, t1;            // the part of the edge that may reach the film: its ends
   Lanes speed0, speed1;     // v_n there [pixels]; n points to the positive side of EdgeView::side
-  std::optional<FaceRef> beside = {};  // FilmRegions::SeenPart; none: a ray finds it
-  bool in_line = false;                // film_lines.h
+  bool in_line = false;     // film_lines.h
 };
 
 // A point of one of them.

@@ -104,7 +104,6 @@ class Term {
   virtual void describe(GradientStats& /*stats*/) const {}
 };
 
-class FilmRegions;
 struct FreeMotion;
 struct Moved;
 struct Parameter;
@@ -126,8 +125,7 @@ class TermInput {
   Lanes lane_scale;            // what makes speeds of the parameters comparable
   EdgeSamplerType sampler;     // how shading points choose an edge
   int threads;
-  bool warps;                            // whether directions are warped, see warp_field.h
-  const FilmRegions* visible = nullptr;  // of the film; null: rays tell what is seen
+  bool warps;  // whether directions are warped, see warp_field.h
   // In reverse mode: what may move, each vertex by itself. Else null.
   const FreeMotion* free = nullptr;
 

@@ -133,7 +133,7 @@ FAULTS = [
     Fault("faces", "centroid shifted", "integrators/film/pixel_parts.cpp",
           "part.my += area * (first.y + p.y + q.y) / 3;",
           "part.my += area * (first.y + p.y + q.y) / 2.9;", "test_faces"),
-    Fault("exact film", "corner on a cut lost", "src/regions/convex_region.cpp",
+    Fault("visible regions", "corner on a cut lost", "src/regions/convex_region.cpp",
           "if (next == 0) part.push_back({after.at, here > 0 ? by : by.other()});", "",
           "test_visible_regions"),
 

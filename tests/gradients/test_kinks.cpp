@@ -192,7 +192,6 @@ struct AlongEdge {
   std::string name;
   std::vector<std::string> parameters;
   std::function<Scene(const TempFiles&, double beside)> scene;
-  bool exact_film = false;
 };
 
 constexpr Vec3d kSide{0.3701, 0.7851, 0.4967};  // Viewpoint's
@@ -276,15 +275,7 @@ std::vector<AlongEdge> along_edge_cases() {
                          constant_light("sky", "0.4, 0.5, 0.7"));
   };
   return {{"Rims", {"sensor.translate.y", "front.translate.y", "back.translate.y"}, rims},
-          {"RimsOnExactFilm",
-           {"sensor.translate.y", "front.translate.y", "back.translate.y"},
-           rims,
-           true},
           {"Sign", {"sensor.translate.y", "front.translate.y", "back.translate.y"}, sign},
-          {"SignOnExactFilm",
-           {"sensor.translate.y", "front.translate.y", "back.translate.y"},
-           sign,
-           true},
           {"Border", {"plate.translate.z", "sensor.translate.z"}, border(-0.5, 0.5)},
           {"BorderOn", {"plate.translate.z", "bulb.translate.y"}, border(0.5, 0.5)},
           {"BorderNear", {"plate.translate.z", "floor.translate.y"}, border(-0.5, 0.02)},
@@ -303,7 +294,6 @@ TEST_P(AlongEdges, AsFromBeside) {
   const auto run = [&](double beside) {
     GradientOptions options;
     options.parameters = GetParam().parameters;
-    options.exact_film = GetParam().exact_film;
     return run_blocks(GetParam().scene(files, beside), options, 256, beside == 0 ? 1 : 2);
   };
   const GradientResult at = run(0), beside = run(2e-4);
@@ -336,27 +326,23 @@ TEST(EdgesInLine, AreToldOf) {
   const auto& sign_scene = std::find_if(cases.begin(), cases.end(), [](const auto& c) {
                              return c.name == "Sign";
                            })->scene;
-  const auto run = [&](const std::string& parameter, double beside, bool exact_film) {
+  const auto run = [&](const std::string& parameter, double beside) {
     GradientOptions options;
     options.parameters = {parameter};
-    options.exact_film = exact_film;
     return run_blocks(sign_scene(files, beside), options, 1, 0);
   };
-  for (const bool exact_film : {false, true}) {
-    for (const char* parameter : {"sensor.translate.y", "back.translate.y", "back.rotate.z"}) {
-      const GradientResult r = run(parameter, 0, exact_film);
-      EXPECT_TRUE(r.at_kink) << parameter;
-      ASSERT_EQ(r.warnings.size(), 1u) << parameter;
-      EXPECT_NE(r.warnings[0].find("edges of \"front\" and \"back\" in one line"),
-                std::string::npos)
-          << r.warnings[0];
-      EXPECT_FALSE(run(parameter, 2e-4, exact_film).at_kink) << parameter;
-    }
-    for (const char* parameter : {"sensor.translate.z", "sensor.rotate.x", "back.translate.x"}) {
-      const GradientResult r = run(parameter, 0, exact_film);
-      EXPECT_FALSE(r.at_kink) << parameter;
-      EXPECT_TRUE(r.warnings.empty()) << parameter;
-    }
+  for (const char* parameter : {"sensor.translate.y", "back.translate.y", "back.rotate.z"}) {
+    const GradientResult r = run(parameter, 0);
+    EXPECT_TRUE(r.at_kink) << parameter;
+    ASSERT_EQ(r.warnings.size(), 1u) << parameter;
+    EXPECT_NE(r.warnings[0].find("edges of \"front\" and \"back\" in one line"), std::string::npos)
+        << r.warnings[0];
+    EXPECT_FALSE(run(parameter, 2e-4).at_kink) << parameter;
+  }
+  for (const char* parameter : {"sensor.translate.z", "sensor.rotate.x", "back.translate.x"}) {
+    const GradientResult r = run(parameter, 0);
+    EXPECT_FALSE(r.at_kink) << parameter;
+    EXPECT_TRUE(r.warnings.empty()) << parameter;
   }
 }
 

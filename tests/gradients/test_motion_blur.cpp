@@ -477,9 +477,6 @@ TEST(MotionBlur, IsRefusedByName) {
   back.method = "analytic";
   const std::string reverse = message([&] { backward(rest, Image(16, 16, 3), back, {}); });
   EXPECT_NE(reverse.find(refused), std::string::npos) << reverse;
-  RenderOptions exact;
-  exact.exact_film = true;
-  EXPECT_NE(image(exact).find("the exact film" + refused), std::string::npos);
   EXPECT_NE(image({.method = "lines"}).find("\"lines\"" + refused), std::string::npos);
   RenderOptions faces;
   faces.points = FilmPoints::kFaces;

@@ -280,9 +280,6 @@ TEST(Sensors, RefuseWhatNeedsAPinhole) {
       }
       return "";
     };
-    RenderOptions exact;
-    exact.exact_film = true;
-    EXPECT_NE(message(exact).find("the exact film needs a pinhole"), std::string::npos);
     RenderOptions faces;
     faces.points = FilmPoints::kFaces;
     faces.method = "analytic";
@@ -290,7 +287,8 @@ TEST(Sensors, RefuseWhatNeedsAPinhole) {
     EXPECT_NE(message({.method = "lines"}).find("\"lines\" needs a pinhole"), std::string::npos);
     GradientOptions gradients;
     gradients.parameters = {"cube.translate.x"};
-    gradients.exact_film = true;
+    gradients.points = FilmPoints::kFaces;
+    gradients.method = "analytic";
     EXPECT_THROW(gradient(scene, gradients, {}), InputError);
   }
 }

@@ -220,7 +220,6 @@ TEST_F(Program, ComparesOnlyWhatItKnows) {
   EXPECT_NE(refused(compare + "forest,forest").find("given twice"), std::string::npos);
   EXPECT_NE(refused(compare + "fd --terms interior").find("all terms in one"), std::string::npos);
   EXPECT_NE(refused(compare + "forest --spp 4").find("--time"), std::string::npos);
-  EXPECT_NE(refused(compare + "fd --film exact").find("none of these does: fd"), std::string::npos);
   EXPECT_NE(refused(compare + "forest --repeats 0").find("--repeats"), std::string::npos);
   EXPECT_FALSE(std::filesystem::exists(files_.path("folder")));
 }
@@ -239,9 +238,7 @@ TEST_F(Program, OptionsOfOthersAreRefused) {
            {fields + " --what ao", "--what"},
            {fields + " --rays 2", "--rays"},
            {images + " --methods rays --lines 2", "--lines"},
-           {images + " --methods path --no-report", "--no-report"},
-           {images + " --methods rays,silhouettes,lines --film exact", "--film exact"},
-           {"render " + scene_ + " --method lines --film exact -o " + out(), "--film"}}) {
+           {images + " --methods path --no-report", "--no-report"}}) {
     const Outcome outcome = run(words);
     EXPECT_EQ(outcome.status, 2) << outcome.text;
     EXPECT_NE(outcome.text.find(option + ": "), std::string::npos) << words << '\n' << outcome.text;

@@ -206,9 +206,6 @@ TEST_F(Parts, ThatDoNotFitAreRefused) {
   make_alien(command + " -D glow=6,5,4.5 --part 3/3");
   EXPECT_NE(merged(with_alien).find("another run than " + part(1) + ": scene is"),
             std::string::npos);
-  make_alien(command + " --film exact --part 3/3");
-  EXPECT_NE(merged(with_alien).find("another run than " + part(1) + ": film is exact, there rays"),
-            std::string::npos);
   make_alien(command + " --part 2/2");
   EXPECT_NE(merged(with_alien).find("is part 2/2, but " + part(1) + " is part 1/3"),
             std::string::npos);

@@ -26,8 +26,6 @@ def test_render_has_the_programs_bits(scene, program, threads):
     assert estimate.spp == 5 and estimate.seconds > 0 and estimate.warnings == []
     assert same(limn.render(scene).value, program("render", *independent))
     assert same(limn.render(scene, generator="sobol").value, program("render"))
-    exact = limn.render(scene, spp=2, threads=threads, film="exact")
-    assert same(exact.value, program("render", "--spp", "2", "--film", "exact", *independent))
 
 
 def test_layers_have_the_programs_bits(folder, scene):
@@ -75,7 +73,6 @@ def test_an_estimate_computes_like_its_value(scene):
      ["--spp", "20", "--terms", "camera", "--samples", "uniform"]),
     ({"spp": 2, "method": "was", "aux": 4, "kappa": 1e3},
      ["--spp", "2", "--method", "was", "--aux", "4", "--kappa", "1e3"]),
-    ({"spp": 2, "film": "exact"}, ["--spp", "2", "--film", "exact"]),
     ({"spp": 2, "method": "fd", "step": 0.01}, ["--spp", "2", "--method", "fd", "--step", "0.01"]),
 ])
 def test_gradient_has_the_programs_bits(folder, scene, program, threads, arguments, words):
@@ -103,7 +100,7 @@ def test_what_a_camera_sees_looks_around(scene):
         limn.render(scene, method="rays")
 
 
-def test_methods_and_films_are_known_by_name(scene, folder):
+def test_methods_are_known_by_name(scene):
     with pytest.raises(limn.InputError, match='unknown method "bidirectional"'):
         limn.render(scene, method="bidirectional")
     for method in ("path", "rays"):
@@ -111,12 +108,6 @@ def test_methods_and_films_are_known_by_name(scene, folder):
             limn.render(scene, method=method, generator="sobel")
     with pytest.raises(limn.InputError, match='the method "analytic": '):
         limn.render(scene, method="analytic")
-    for run in (limn.render, lambda s, film: limn.gradient(s, "tent.scale", film=film)):
-        with pytest.raises(limn.InputError, match='unknown film "ray"'):
-            run(scene, film="ray")
-    text = (folder / "scene.xml").read_text().replace('"box"', '"gaussian"')
-    with pytest.raises(limn.InputError, match="box"):
-        limn.render(limn.load_string(text, folder), film="exact")
 
 
 @pytest.mark.parametrize("call, text", [
@@ -163,13 +154,6 @@ def test_check_and_compare_say_what_the_program_says(folder, scene):
     assert check.found == told["smallest_at"] and check.step == told["step"]
     assert check.gradient_sum == told["gradient_sum"] and check.z_sum == told["z_sum"]
     assert check.gradient.value.shape == check.differences.value.shape == (12, 16, 3)
-    exact = limn.check(scene, "tent.translate.y", spp=16, film="exact")
-    subprocess.run([*words, "--film", "exact"], capture_output=True, check=False)
-    told = json.loads((folder / "check.json").read_text())[0]
-    assert told["film"] == "exact" and exact.gradient_sum == told["gradient_sum"]
-    assert exact.gradient_sum != check.gradient_sum
-    with pytest.raises(limn.InputError, match="none of these does: fd"):
-        limn.compare(scene, "tent.translate.y", ["fd"], [0.05], film="exact")
     with pytest.raises(limn.InputError, match="check needs spp of at least 2"):
         limn.check(scene, "tent.translate.y", spp=1)
     with pytest.raises(limn.InputError, match="are for the method was"):

@@ -86,10 +86,10 @@ TEST(Options, NumbersOutOfRangeAreRefused) {
 
 TEST(Options, UnknownWordsListTheKnown) {
   try {
-    number_of(kFilmOption, "ray");
+    number_of(kPointsOption, "face");
     FAIL();
   } catch (const InputError& error) {
-    EXPECT_STREQ(error.what(), "error: unknown film \"ray\" (known: rays, exact)");
+    EXPECT_STREQ(error.what(), "error: unknown points \"face\" (known: random, faces)");
   }
 }
 

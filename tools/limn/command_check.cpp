@@ -117,7 +117,7 @@ void print_check(const std::string& name, const CheckResult& r, double seconds) 
   print_verdict(r, seconds);
 }
 
-json figures_json(const std::string& name, const std::string& film, const CheckResult& r) {
+json figures_json(const std::string& name, const CheckResult& r) {
   json samples = json::object(), visible = json::object(), shares = json::object();
   for (const TermRun& term : r.gradient.terms) samples[term.name] = term.samples;
   for (const CheckPower& power : r.power) {
@@ -127,7 +127,6 @@ json figures_json(const std::string& name, const std::string& film, const CheckR
   }
   json report = {{"parameter", name},
                  {"method", r.gradient.method},
-                 {"film", film},
                  {"step", r.step},
                  {"spp", r.spp},
                  {"difference_spp", r.difference_spp},
@@ -187,9 +186,6 @@ class CheckCommand final : public Command {
     check_outputs({{"--json", common_.json}}, scene, field_files(parameters_));
     check_warp(options_.warp, {reverse_ ? reverse_method() : options_.method});
     check_blur(options_.blur, {reverse_ ? reverse_method() : options_.method});
-    if (reverse_ && options_.exact_film) {
-      throw InputError("--film exact: reverse mode has its film by rays");
-    }
     refuse_samples(*app_, options_.points, {"--spp", "--time", "--samples", "--reverse"}, options_);
     if (options_.points == FilmPoints::kFaces) return run_faces(scene);
     if (reverse_) return run_reverse(scene);
@@ -207,7 +203,7 @@ class CheckCommand final : public Command {
       if (r.interrupted) return no_verdict();
       warnings_.add_all(r.gradient.warnings);
       print_check(parameter, r, settings.seconds);
-      report.push_back(figures_json(parameter, kFilms[options_.exact_film], r));
+      report.push_back(figures_json(parameter, r));
       report.back()["sensor"] = sensor_name(scene);
       report.back()["warnings"] = warnings_.lines();
       add_verdict(r.verdict, status);

@@ -50,12 +50,6 @@ std::vector<std::string> own_names(const std::vector<std::string>& names) {
 
 void check_methods_of_images(const CLI::App& app, const CompareArguments& command) {
   std::vector<Method> methods = parse_methods(command.methods, Task::kImage);
-  const auto takes_film = [](const Method& method) {
-    return !method->image->looks_around && !method->blurs;
-  };
-  if (command.render.exact_film && std::ranges::none_of(methods, takes_film)) {
-    throw InputError("--film exact: none of --methods takes it; path and analytic do");
-  }
   check_blur(command.render.blur, methods);
   methods.emplace_back("rays");  // makes the reference
   check_image_options(app, methods);
@@ -152,7 +146,6 @@ class Comparer {
                block_size(scene.film),
                parse_samples(command.samples),
                command.gradient.warp,
-               command.gradient.exact_film,
                command.gradient.blur},
         identity_(identify(input_, common.defines)),
         kept_file_((fs::path(command.output) / "reference.exr").string()) {
@@ -353,7 +346,6 @@ void CompareCommand::add_options(CLI::App& app) {
 void CompareCommand::check_images() {
   refuse_options(*app_, {"--terms", "--samples", "--step", "--aux", "--kappa", "--no-report"},
                  "derivatives alone have that: not with --image");
-  command_.render.exact_film = command_.gradient.exact_film;
   command_.render.blur = command_.gradient.blur;
   command_.report = false;
   check_methods_of_images(*app_, command_);
@@ -385,7 +377,6 @@ int CompareCommand::run(const std::string& command_line) {
   const Scene scene = load_scene(common_, warnings);
   if (!command_.images) {
     find_parameter(scene, command_.parameter);
-    if (command_.gradient.exact_film) check_exact_films(scene, methods);
   }
   make_folder(command_.output);
   check_outputs(

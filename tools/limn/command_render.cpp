@@ -92,10 +92,9 @@ class RenderCommand final : public Command {
       if (std::find(layers.begin(), layers.end(), name) != layers.end()) continue;
       throw InputError("--what: " + unknown_name("word", name, known));
     }
-    refuse_options(
-        *app_,
-        {"--method", "--generator", "--film", "--points", "--part", "--debug-sample", "--time"},
-        "not for layers (--what)");
+    refuse_options(*app_,
+                   {"--method", "--generator", "--points", "--part", "--debug-sample", "--time"},
+                   "not for layers (--what)");
     return true;
   }
   static std::vector<std::string> split_names(const std::string& text) {

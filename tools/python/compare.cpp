@@ -73,7 +73,6 @@ void check_call(const Scene& scene, const CompareCall& call, const std::vector<M
   if (methods.empty()) throw InputError("compare needs a method or more");
   check_warp(call.options.warp, methods);
   check_blur(call.options.blur, methods);
-  if (call.options.exact_film) check_exact_films(scene, methods);
   if (call.repeats < 1) throw InputError("repeats must be 1 or more");
   double before = 0;
   for (const double time : call.times) {
@@ -88,15 +87,8 @@ Comparison CompareCall::run(const Arguments& /*given*/) const {
   const std::vector<Method> chosen(methods.begin(), methods.end());
   check_call(*shared, *this, chosen);
   const int width = shared->film.crop_width, height = shared->film.crop_height;
-  const MethodInput input{*shared,
-                          name,
-                          {},
-                          0,
-                          block_size(shared->film),
-                          std::nullopt,
-                          options.warp,
-                          options.exact_film,
-                          options.blur};
+  const MethodInput input{*shared,      name,         {},          0, block_size(shared->film),
+                          std::nullopt, options.warp, options.blur};
   double all = 0;
   for (const double time : times) all += time * repeats;
   Reference reference;

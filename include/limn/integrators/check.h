@@ -17,8 +17,7 @@ struct CheckOptions {
   int block = 0;                   // pixels between windows; 0: an eighth of the longer side
   std::optional<SampleCounts> samples = SampleCounts{};  // of the gradient
   WarpOptions warp;
-  Blur blur;                // of methods that blur: of the gradient and of the differences
-  bool exact_film = false;  // of the gradient, see GradientOptions; differences take rays
+  Blur blur;  // of methods that blur: of the gradient and of the differences
   FilmPoints points = FilmPoints::kRandom;  // faces: for check_faces() alone
 };
 

@@ -8,7 +8,7 @@
 
 namespace limn {
 
-// Renders by `method` with what `options` has besides; the exact film is for those that take it.
+// Renders by `method` with what `options` has besides.
 // Makes one sample first, by `settings`: InputError if the method does not know the scene, which
 // must outlive it. block: pixels, of the block sums.
 std::unique_ptr<TimedMethod> make_image_method(const Scene& scene, RenderOptions options,

@@ -64,9 +64,6 @@ struct GradientOptions {
   bool uniform_samples = false;
   double step = 0;  // of finite differences; 0: found by a pilot
   int block = 0;    // also keep moments of sums over blocks of this many pixels
-  // Edges on the film are drawn from what is seen of them alone, by exact visible regions of every
-  // pixel. InputError unless the film has a box filter, and for methods that draw none.
-  bool exact_film = false;
   // InputError for others than random where the method has no light in closed form. With faces the
   // terms are one, `faces`, and there are no samples of terms.
   FilmPoints points = FilmPoints::kRandom;
@@ -134,11 +131,6 @@ struct GradientResult {
 
 // The magnitude of what terms of edges add to one block of g, a parameter of the result.
 double edge_magnitude(const GradientResult& result, const ParameterGradient& g, size_t block);
-
-// InputError unless the method draws edges on the film and the film has a box filter.
-void check_exact_film(const Scene& scene, const Method& method);
-// The same unless one of them does, at least: others take rays.
-void check_exact_films(const Scene& scene, const std::vector<Method>& methods);
 
 // Parameters are differentiated in passes of kLanes over the same samples. InputError for no
 // parameters, unknown parameters, methods or terms, for a method that cannot leave terms out, for

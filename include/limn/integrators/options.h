@@ -11,18 +11,12 @@
 
 namespace limn {
 
-inline constexpr const char* kFilms[] = {"rays", "exact"};
-
 inline constexpr Option kPointsOption = choice(
     "points", kFilmPoints,
     "Points at which the method analytic evaluates light. random: random points of each pixel. "
     "faces: one point per visible face of each pixel, weighted by its visible area. Faces has no "
     "noise and needs a box filter; its gradient is exact for its own image, which ignores how "
     "light varies within a pixel's part of a face");
-inline constexpr Option kFilmOption = choice(
-    "film", kFilms,
-    "Visibility from the camera (in gradients, of the edges that it sees): by rays, or by the "
-    "exact visible regions of every pixel, which needs a box filter");
 inline constexpr Option kGeneratorOption =
     choice("generator", kGenerators,
            "Sample generator: Owen-scrambled Sobol' points (a third of the squared error, mostly, "
@@ -99,7 +93,6 @@ void visit_options(Like<RenderOptions> auto& o, auto&& visit) {
   visit(o.rays, Option{"rays", "Method rays: rays per point for the sky and for each area light", 1,
                        1 << 20});
   visit(o.generator, kGeneratorOption);
-  visit(o.exact_film, kFilmOption);
   visit(o.points, kPointsOption);
   visit_options(o.blur, visit);
 }
@@ -110,7 +103,6 @@ void visit_options(Like<GradientOptions> auto& o, auto&& visit) {
   visit(o.step, step_option("Step of finite differences (method fd), in the parameter's unit"));
   visit_options(o.warp, visit);
   visit_options(o.blur, visit);
-  visit(o.exact_film, kFilmOption);
   visit(o.points, kPointsOption);
 }
 
@@ -124,7 +116,6 @@ void visit_options(Like<CheckOptions> auto& o, auto&& visit) {
             .samples());
   visit_options(o.warp, visit);
   visit_options(o.blur, visit);
-  visit(o.exact_film, kFilmOption);
   visit(o.points, kPointsOption);
 }
 

@@ -39,11 +39,7 @@ inline constexpr const char* kRenderWhat[] = {"image", "direct", "ao", "openness
 inline constexpr const char* kGenerators[] = {"sobol", "independent"};
 
 struct RenderOptions {
-  Method method{Task::kImage};  // InputError for one that makes no images
-  // Paths start at points of the visible regions of every pixel, which are found once, exactly
-  // (limn/core/visible_regions.h), in place of rays from the camera. InputError unless the film has
-  // a box filter.
-  bool exact_film = false;
+  Method method{Task::kImage};              // InputError for one that makes no images
   FilmPoints points = FilmPoints::kRandom;  // InputError for others where light is sampled
   RenderWhat what = RenderWhat::kImage;     // InputError where the method does not know it
   // silhouettes, lines: lines through the sky, 1 to 16384; a quarter of them through an emitter.

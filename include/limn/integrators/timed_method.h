@@ -57,9 +57,6 @@ struct MethodInput {
   int block = 8;                                       // pixels, of the block sums
   std::optional<SampleCounts> samples = std::nullopt;  // of the terms; none: chosen by a pilot
   WarpOptions warp = {};
-  // Of the methods that draw edges on the film, see GradientOptions; others, and references, take
-  // rays.
-  bool exact_film = false;
   Blur blur = {};  // of methods that blur
 
   GradientOptions options(const Method& method) const;
