@@ -169,7 +169,10 @@ std::vector<Parameter> list_parameters(const Scene& scene) {
 Parameter find_parameter_or_array(const Scene& scene, const std::string& name) {
   constexpr std::string_view kOneValue = ".value";
   if (name.ends_with(kOneValue)) {
-    return find_parameter_or_array(scene, name.substr(0, name.size() - kOneValue.size()));
+    const std::string stem = name.substr(0, name.size() - kOneValue.size());
+    Parameter found = find_parameter_or_array(scene, stem);
+    found.name = name;  // results are looked up by the name that was given
+    return found;
   }
   const std::vector<Parameter> list = list_parameters(scene);
   for (const Parameter& p : list) {

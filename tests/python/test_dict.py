@@ -72,6 +72,22 @@ def test_transforms_go_the_way_of_matrices():
         assert np.abs(corners(transform) - corners(asked[-1])).max() <= 4 * 2.0**-24 * 4
 
 
+def test_transforms_move_points():
+    t = limn.Transform()
+    steps = t.translate([1, 2, 3]).rotate([1, 2, -1], 40).scale([1, 2, 0.5])
+    still = corners_of(t).astype(float)
+    moved = steps @ still
+    assert np.abs(moved - corners_of(steps)).max() <= 4 * 2.0**-24 * 8  # the rounding of floats
+    np.testing.assert_array_equal(steps @ still[3], moved[3])
+    np.testing.assert_allclose((limn.Transform(steps.matrix) @ t.scale(2)).matrix,
+                               steps.matrix @ np.diag([2, 2, 2, 1]))  # fmt: skip
+    pose = t.look_at([1, 3, 5], [0, 0.5, 0], up=[0, 1, 0])
+    eye = limn.load_dict({"type": "scene", "eye": {"type": "perspective", "to_world": pose}})
+    np.testing.assert_allclose(pose.matrix, eye.sensor_to_world, atol=1e-12)
+    with pytest.raises(limn.InputError, match=r"points have shape \(3,\) or \(N, 3\), not \(2,\)"):
+        steps @ [1, 2]
+
+
 @pytest.mark.parametrize("change, text", [
     ({"ball": {"type": "sphere", "radius": -1}},
      r"^dict\.ball\.radius: error: .*"),

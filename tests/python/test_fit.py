@@ -39,6 +39,16 @@ def test_one_call_is_a_fit_and_its_run(scene):
         limn.fit(scene, target, "clay.reflectance", 1, sppp=2)
 
 
+def test_results_have_the_names_that_were_given(scene):
+    target = limn.render(scene, spp=16, seed=9)
+    adjoint = limn.image_loss(scene, target, spp=4).adjoint
+    ours, mitsubas = "clay.reflectance", "clay.reflectance.value"
+    slopes = [limn.backward(scene, adjoint, name, spp=4)[name].value for name in (ours, mitsubas)]
+    np.testing.assert_array_equal(*slopes)
+    fits = [limn.fit(scene, target, name, 1, spp=2).values[name] for name in (ours, mitsubas)]
+    np.testing.assert_array_equal(*fits)
+
+
 def test_vertices_go_along_their_normals(scene):
     target = limn.render(scene, spp=64, seed=9)
     start = scene.copy()

@@ -8,7 +8,7 @@ import re
 import tempfile
 import warnings
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, overload
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -86,12 +86,37 @@ def _pixels(image: Any, raw: bool) -> npt.NDArray[Any]:
     return linear.astype(np.float32)
 
 
+def _step_matrix(tag: str, attributes: Mapping[str, str]) -> npt.NDArray[np.float64]:
+    """(4, 4) of one step of a Transform, as the reader of files makes it."""
+    values = {k: np.array(v.split(), dtype=float) for k, v in attributes.items()}
+    made = np.eye(4)
+    if tag == "matrix":
+        size = 3 if len(values["value"]) == 9 else 4
+        made[:size, :size] = values["value"].reshape(size, size)
+    elif tag == "translate":
+        made[:3, 3] = values["value"]
+    elif tag == "scale":
+        made[:3, :3] = np.diag(np.broadcast_to(values["value"], 3))
+    elif tag == "rotate":
+        x, y, z = axis = values["value"] / np.linalg.norm(values["value"])
+        turn, cross = np.radians(values["angle"][0]), np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+        made[:3, :3] = (np.cos(turn) * np.eye(3) + np.sin(turn) * cross
+                        + (1 - np.cos(turn)) * np.outer(axis, axis))  # fmt: skip
+    else:  # lookat
+        ahead = values["target"] - values["origin"]
+        ahead /= np.linalg.norm(ahead)
+        left = np.cross(values["up"], ahead)
+        left /= np.linalg.norm(left)
+        made[:3] = np.column_stack([left, np.cross(ahead, left), ahead, values["origin"]])
+    return made
+
+
 class Transform:
     """A transformation of space, made of steps as Mitsuba's ScalarTransform4f is.
 
         limn.Transform().translate([0, 1, 0]).rotate([0, 1, 0], 30)    # turns, then moves
 
-    `a @ b` does b first.
+    `a @ b` does b first; `a @ point` is where a point (3,) goes, or each row of (N, 3).
     """
 
     def __init__(self, matrix: npt.ArrayLike | None = None) -> None:
@@ -101,7 +126,27 @@ class Transform:
             values = np.asarray(matrix, dtype=float).reshape(-1)
             self._steps = (("matrix", {"value": _three(values)}),)
 
-    def __matmul__(self, first: Transform) -> Transform:
+    @property
+    def matrix(self) -> npt.NDArray[np.float64]:
+        """(4, 4), from the space of what is transformed to the world, for columns."""
+        product = np.eye(4)
+        for tag, attributes in self._steps:
+            product = _step_matrix(tag, attributes) @ product
+        return product
+
+    @overload
+    def __matmul__(self, first: Transform) -> Transform: ...
+
+    @overload
+    def __matmul__(self, first: npt.ArrayLike) -> npt.NDArray[np.float64]: ...
+
+    def __matmul__(self, first: Transform | npt.ArrayLike) -> Transform | npt.NDArray[np.float64]:
+        if not isinstance(first, Transform):
+            points = np.asarray(first, dtype=float)
+            if points.ndim not in (1, 2) or points.shape[-1] != 3:
+                raise InputError(f"points have shape (3,) or (N, 3), not {points.shape}")
+            moved = points @ self.matrix[:, :3].T + self.matrix[:, 3]
+            return np.asarray(moved[..., :3] / moved[..., 3:])
         both = Transform()
         both._steps = first._steps + self._steps
         return both
