@@ -65,7 +65,7 @@ MappedNormalOptions read_mapped_normal_options(Properties& properties) {
 std::shared_ptr<Bsdf> read_mapped_bsdf(Properties& properties, int own) {
   const std::shared_ptr<Bsdf> nested = read_nested(properties, 1, own, 0)[0];
   if (nested->lobes().through) {
-    properties.fail("takes no bsdf that passes light: " + nested->describe());
+    properties.fail("takes no bsdf that passes light (remove the map): " + nested->describe());
   }
   if (nested->side(false)) properties.fail("takes no bsdf of two sides: put it inside twosided");
   return nested;

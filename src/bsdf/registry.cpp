@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "limn/core/advice.h"
 #include "limn/core/make_bsdf.h"
 #include "limn/core/names.h"
 #include "src/bsdf/types.h"
@@ -50,8 +51,7 @@ std::shared_ptr<Bsdf> make_bsdf(Properties& properties) {
   for (const BsdfType& type : kTypes) {
     if (properties.type() == type.name) return type.read(properties);
   }
-  throw InputError(properties.where(),
-                   unknown_name("bsdf type", properties.type(), names_of(kTypes)));
+  throw InputError(properties.where(), unknown_type("bsdf", properties.type(), names_of(kTypes)));
 }
 
 std::shared_ptr<Texture> read_texture(Properties& properties, const char* name, double most) {

@@ -1,6 +1,7 @@
 // The table of emitter types, and helpers of their readers.
 #include <string>
 
+#include "limn/core/advice.h"
 #include "src/light/types.h"
 
 namespace limn {
@@ -40,7 +41,7 @@ void read_light(Properties& properties, Scene& scene, Shape* shape) {
   const std::string place = in_shape ? "of an emitter inside a shape " : "";
   throw InputError(properties.where(), "unknown " + std::string(in_shape ? "" : "emitter ") +
                                            "type \"" + properties.type() + "\" " + place +
-                                           "(known: " + known + ")");
+                                           "(known: " + known + ")" + advice_on(properties.type()));
 }
 
 std::shared_ptr<Texture> read_emission(Properties& properties, const char* name) {

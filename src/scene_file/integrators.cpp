@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "limn/core/advice.h"
 #include "limn/core/names.h"
 
 namespace limn {
@@ -55,8 +56,9 @@ int depth(Properties& p, const std::string& name, int absent, int least, const c
 void check_no_null(const ObjectDescription& object, const std::string& integrator) {
   static const std::vector<std::string> kNull = {"mask", "null", "thindielectric"};
   if (object.tag == "bsdf" && std::find(kNull.begin(), kNull.end(), object.type) != kNull.end()) {
-    throw InputError(object.where, "bsdf \"" + object.type + "\": " + integrator +
-                                       " passes it where path does not: change the integrator");
+    throw InputError(object.where,
+                     "bsdf \"" + object.type + "\": " + integrator +
+                         " passes it where path does not: change the integrator to path");
   }
   for (const ChildDescription& child : object.children) check_no_null(*child.object, integrator);
 }
@@ -68,7 +70,7 @@ void read_integrator(const ObjectDescription& object, const SceneDescription& de
   const auto type = std::find_if(types().begin(), types().end(),
                                  [&](const IntegratorType& t) { return object.type == t.name; });
   if (type == types().end()) {
-    throw InputError(object.where, unknown_name("integrator type", object.type, names_of(types())));
+    throw InputError(object.where, unknown_type("integrator", object.type, names_of(types())));
   }
   DescribedProperties p(object, description, kNoMakers);
   for (const std::string& name : type->unwritten) {
@@ -78,14 +80,18 @@ void read_integrator(const ObjectDescription& object, const SceneDescription& de
   if (type->is_wrapper) {
     const ObjectDescription* nested = p.nested("integrator");
     p.check_all_used();
-    if (!nested) p.fail("takes one integrator");
+    if (!nested) {
+      p.fail(std::string("takes one integrator") +
+             (object.type == "aov" ? "; render --what writes depth, normals, ..." : ""));
+    }
     read_integrator(*nested, description, scene, warnings);
     return;
   }
   scene.max_depth = type->max_depth;
   if (!type->is_depth_fixed) {
-    scene.max_depth =
-        depth(p, "max_depth", type->max_depth, -1, "must be -1 (no limit) or 0 and more");
+    constexpr char kRange[] = "must be -1 (no limit) or 1 and more (of 0 the image is black)";
+    scene.max_depth = depth(p, "max_depth", type->max_depth, -1, kRange);
+    if (scene.max_depth == 0) p.fail("max_depth", kRange);
   }
   if (!type->is_depth_fixed) scene.rr_depth = depth(p, "rr_depth", 5, 1, "must be 1 or more");
   scene.hide_emitters = p.boolean("hide_emitters", false);

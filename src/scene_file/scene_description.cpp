@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <set>
 
+#include "limn/core/advice.h"
 #include "limn/core/names.h"
 
 namespace limn {
@@ -80,7 +81,7 @@ class Describer {
       known.insert(known.end(), {"alias", "default", "include", "path", "ref"});
       std::sort(known.begin(), known.end());
       throw InputError(element.where, "<scene>: unknown element <" + element.name + "> (" +
-                                          known_names(known) + ")");
+                                          known_names(known) + ")" + advice_on(element.name));
     }
   }
 
@@ -175,7 +176,8 @@ class Describer {
       std::sort(known.begin(), known.end());
       known.erase(std::unique(known.begin(), known.end()), known.end());
       throw InputError(element.where, object.tag + " \"" + object.type + "\": unknown element <" +
-                                          element.name + "> (" + known_names(known) + ")");
+                                          element.name + "> (" + known_names(known) + ")" +
+                                          advice_on(element.name));
     }
   }
 

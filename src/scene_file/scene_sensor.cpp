@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "limn/core/advice.h"
 #include "limn/core/memory.h"
 #include "limn/core/names.h"
 #include "src/base/text.h"
@@ -18,7 +19,7 @@ const Makers kNoMakers;
 
 [[noreturn]] void fail_unknown_type(const ObjectDescription& object,
                                     const std::vector<std::string>& known) {
-  throw InputError(object.where, unknown_name(object.tag + " type", object.type, known));
+  throw InputError(object.where, unknown_type(object.tag, object.type, known));
 }
 
 int bounded_integer(Properties& properties, const std::string& name, int64_t absent,
@@ -151,7 +152,7 @@ void read_sampler(const ObjectDescription& object, const SceneDescription& descr
   DescribedProperties p(object, description, kNoMakers);
   if (object.type != "independent") {
     warnings.push_back(format_warning(
-        object.where, "sampler \"" + object.type + "\" is read as independent: generator chooses"));
+        object.where, "sampler \"" + object.type + "\" is read as independent (see --generator)"));
     p.boolean("jitter", true);
     p.integer("strength", 2);
   }

@@ -41,7 +41,10 @@ std::string find_input(const std::string& name, const std::string& mentioned_in,
   for (const fs::path& path : candidates) {  // an absolute name replaces what it is appended to
     if (is_there(path, error)) return path.string();
   }
-  return "";
+  if (name.find('\\') == std::string::npos) return "";
+  std::string slashes = name;  // of a name written on Windows
+  std::replace(slashes.begin(), slashes.end(), '\\', '/');
+  return find_input(slashes, mentioned_in, search_path, is_there);
 }
 
 class TreeLoader {

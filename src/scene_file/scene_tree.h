@@ -32,7 +32,7 @@ SceneTree load_scene_tree(const std::string& file, const SceneInput& input, cons
                           ErrorList& errors);
 
 // The first existing file of: `name` if absolute; in the directory of the referring file; in the
-// search path. "" if none exists.
+// search path; then of `name` with \ as /. "" if none exists.
 std::string find_input_file(const std::string& name, const std::string& mentioned_in,
                             const std::vector<std::string>& search_path);
 

@@ -7,6 +7,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "limn/core/advice.h"
 #include "limn/core/face_overlaps.h"
 #include "limn/core/make_bsdf.h"
 #include "limn/core/memory.h"
@@ -265,7 +266,7 @@ class SceneBuilder {
     if (type == "cylinder") return read_cylinder(p, options);
     if (type == "sphere") return read_sphere(p, options);
     if (curves) return read_curves(p, options);
-    throw InputError(p.where(), unknown_name("shape type", type,
+    throw InputError(p.where(), unknown_type("shape", type,
                                              {"bsplinecurve", "cube", "cylinder", "disk",
                                               "instance", "linearcurve", "obj", "ply", "rectangle",
                                               "serialized", "shapegroup", "sphere"}));

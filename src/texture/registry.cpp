@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "limn/core/advice.h"
 #include "limn/core/image.h"
 #include "limn/core/names.h"
 #include "src/texture/types.h"
@@ -30,7 +31,7 @@ std::shared_ptr<Texture> make_texture(Properties& properties) {
     if (properties.type() == type.name) return type.read(properties);
   }
   throw InputError(properties.where(),
-                   unknown_name("texture type", properties.type(), names_of(kTypes)));
+                   unknown_type("texture", properties.type(), names_of(kTypes)));
 }
 
 bool UvTransform::is_identity() const {

@@ -141,7 +141,7 @@ TEST(BadScene, IndependentMistakesAreReportedTogether) {
             "@/s.xml:6:43: error: undefined parameter \"$r\"\n"
             "@/s.xml: error: -D q=1: the scene has no parameter \"$q\"\n"
             "@/s.xml: error: -D s=2: the scene has no parameter \"$s\"\n"
-            "@/s.xml:8:1: error: <scene>: unknown element <medium>\n"
+            "@/s.xml:8:1: error: <scene>: unknown element <medium>; limn has no volumes\n"
             "@/s.xml:6:60: error: there is no object with the id \"steel\"\n"
             "@/s.xml:7:24: error: there is no object with the id \"wood\"\n"
             "@/s.xml:4:1: error: unknown bsdf type \"hair\"\n"

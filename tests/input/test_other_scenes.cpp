@@ -58,6 +58,16 @@ TEST(OtherScenes, VolpathWithoutWhatItPasses) {
             std::string::npos);
 }
 
+TEST(OtherScenes, NamesOfFilesFromWindows) {
+  TempFiles files;
+  std::filesystem::create_directory(files.path("parts"));
+  files.write("parts/path.xml",
+              "<integrator type=\"path\"><integer name=\"max_depth\" value=\"7\"/></integrator>");
+  const std::string file =
+      files.write("s.xml", scene_text("<include filename=\"parts\\path.xml\"/>"));
+  EXPECT_EQ(read_scene(file, {}, nullptr).max_depth, 7);
+}
+
 TEST(OtherScenes, SamplersFilmsAndTypesWithRemarks) {
   std::vector<std::string> warnings;
   const Scene scene = read_scene_text(
@@ -73,8 +83,8 @@ TEST(OtherScenes, SamplersFilmsAndTypesWithRemarks) {
                 "string:1:32: warning: sensor type \"Perspective\" is read as \"perspective\", "
                 "which Mitsuba finds on some systems only",
                 "string:3:22: warning: pixel_format rgba is written as rgb",
-                "string:2:1: warning: sampler \"multijitter\" is read as independent: generator "
-                "chooses"}));
+                "string:2:1: warning: sampler \"multijitter\" is read as independent (see "
+                "--generator)"}));
 }
 
 TEST(OtherScenes, ObjectsUnderTheSceneByReference) {

@@ -95,6 +95,8 @@ def test_transforms_move_points():
      r'^dict\.ball\.bsdf\.alpha: error: .*unknown parameter "alpha"'),
     ({"ball": {"type": "stl", "filename": "b.stl"}},
      r'^dict\.ball: error: unknown type "stl" .*; "mesh" reads STL, glTF, \.\.\.\)'),
+    ({"ball": {"type": "heterogeneous"}},
+     r'^dict\.ball: error: unknown type "heterogeneous" \(known: .*\); limn has no volumes'),
     ({"ball": {"type": "globe"}}, r'^dict\.ball: error: unknown type "globe" \(known: aov, area, '),
     ({"ball": {"type": "sphere", "bsdf": {"type": "ref", "id": "wood"}}}, r"^dict\.ball\.bsdf: error"),
     ({"ball": {"type": "sphere", "center": [1, 2]}},

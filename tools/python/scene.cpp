@@ -5,6 +5,7 @@
 
 #include <map>
 
+#include "limn/core/advice.h"
 #include "limn/core/error.h"
 #include "limn/core/field_error.h"
 #include "limn/core/names.h"
@@ -288,6 +289,7 @@ nb::class_<SceneHandle> bind_scene(nb::module_& m) {
         "smooth_as: the roughness (GGX) that smooth conductors, dielectrics and plastics get, so "
         "that derivatives have all edges (0.003), plastics a few percent darker; 0: they stay "
         "smooth. Raises limn.InputError with file, line and column.");
+  m.def("_advice_on", advice_on);
   m.def("load_string", load_string, nb::arg("xml"), nb::arg("folder") = "",
         nb::arg("substitutions"),
         nb::sig("def load_string(xml: str, folder: str | os.PathLike[str] = '', **substitutions: "
