@@ -109,18 +109,21 @@ double reflected(const Facets<double>& facets, const VisibleNormals& normals, co
 
 RoughBoundary::RoughBoundary(Distribution distribution, double alpha, double eta)
     : values_(table(distribution, alpha, eta)) {
-  // Central differences. Nodes that cross the critical angle inside are noise of half a percent of
-  // the slopes at this step, measured at roughness 0.3 and indices around 1.6.
+  // Central differences. Inside, the critical angle crosses one cosine after another as eta grows,
+  // and on smooth boundaries each makes a stair: the differences span exactly one. Slopes of inner
+  // reflectances are then within 2 % of exact ones, for indices from 1.3 to 2.4.
   constexpr double kStep = 0.02;
-  const auto slopes = [&](double step_alpha, double step_eta, double step) {
-    const Table more = table(distribution, alpha + step_alpha, eta + step_eta);
-    const Table less = table(distribution, alpha - step_alpha, eta - step_eta);
+  const double stair = eta > 1 ? eta * eta * std::sqrt(eta * eta - 1) / (kCosines - 1) : 0;
+  const double step_eta = stair > 0 && stair < eta - 1 ? stair / 2 : kStep * eta;
+  const auto slopes = [&](double by_alpha, double by_eta, double step) {
+    const Table more = table(distribution, alpha + by_alpha, eta + by_eta);
+    const Table less = table(distribution, alpha - by_alpha, eta - by_eta);
     Table slope;
     for (size_t i = 0; i < slope.size(); ++i) slope[i] = (more[i] - less[i]) / (2 * step);
     return slope;
   };
   by_alpha_ = slopes(kStep * alpha, 0, kStep * alpha);
-  by_eta_ = slopes(0, kStep * eta, kStep * eta);
+  by_eta_ = slopes(0, step_eta, step_eta);
 }
 
 RoughBoundary::Table RoughBoundary::table(Distribution distribution, double alpha, double eta) {

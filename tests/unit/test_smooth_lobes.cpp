@@ -6,6 +6,7 @@
 #include "limn/core/make_bsdf.h"
 #include "limn/core/rng.h"
 #include "src/bsdf/fresnel.h"
+#include "src/bsdf/rough_boundary.h"
 #include "support/bsdf_cases.h"
 #include "support/running_mean.h"
 #include "support/test_properties.h"
@@ -340,6 +341,26 @@ TEST(SmoothLobes, AreLimitsOfRoughOnes) {
           << c.type << " at " << polar << ": " << mean.mean() << " +- " << mean.standard_error()
           << ", " << exact;
     }
+  }
+}
+
+// The inside of a nearly smooth boundary: of diffuse light it reflects, by the index, what a smooth
+// one does. Sums over cosines 1/63 apart resolve the critical angle to that: so far may slopes be.
+TEST(RoughBoundary, InnerReflectanceOfSmoothOnesHasTheSlopeOfFresnels) {
+  const auto exact = [](double eta) {
+    constexpr int kNodes = 20000;
+    double sum = 0;
+    for (int i = 0; i < kNodes; ++i) {
+      const double c = (i + 0.5) / kNodes;
+      sum += fresnel_dielectric<double>(c, 1 / eta).reflected * 2 * c / kNodes;
+    }
+    return sum;
+  };
+  for (const double eta : {1.3, 1.49, 1.7, 1.9, 2.0, 2.4}) {
+    const RoughBoundary boundary(microfacet::Distribution::kBeckmann, 1e-3, eta);
+    const double slope = boundary.inner_reflectance(Dual(1e-3), Dual(eta, {1, 0, 0, 0})).d.lane[0];
+    const double expected = (exact(eta + 0.01) - exact(eta - 0.01)) / 0.02;
+    EXPECT_NEAR(slope / expected, 1, 2.0 / 63) << eta;
   }
 }
 
