@@ -200,20 +200,39 @@ double CameraEdges::emitted_at(const FilmEdge& edge) const {
   return most;
 }
 
-double CameraEdges::root_mean_square(bool of_emitters) const {
+double CameraEdges::fold_at(const EdgeMesh& mesh, EdgeId id) const {
+  const Mesh& of = scene().shape(mesh.shape).mesh;
+  if (of.normal_source != NormalSource::kFace || of.textured) return 1;
+  const auto [first, second] = mesh.edge(id).faces;
+  return length(cross(mesh.plane(first).n, mesh.plane(second).n));
+}
+
+CameraEdges::Contrast CameraEdges::contrast_of(const FilmEdge& edge) const {
+  if (const double emitted = emitted_at(edge); emitted > 0) return {kEmitter, emitted};
+  const Camera& camera = views_[edge.view].camera;
+  if (edge.clip != FilmEdge::kNoClip || edge.refracted || camera.is_orthographic())
+    return {kOutline, 1};
+  const EdgeMesh& mesh = input_.object(edge.id.object);
+  const EdgeId id = edge.id.edge;
+  if (mesh.edge(id).edge_class != EdgeClass::kSharp || is_outline(mesh, id, value(camera.origin)))
+    return {kOutline, 1};
+  return {kFold, fold_at(mesh, id)};
+}
+
+double CameraEdges::root_mean_square(Kind kind) const {
   DiscreteDistribution choice;
   for (const Piece& piece : pieces_) {
     const FilmEdge& edge = edges_[piece.edge];
     double share = 0;
     for (int k = 0; k < lanes_; ++k) share += piece.weight[k];
-    choice.add(!edge.refracted && (emitted_at(edge) > 0) == of_emitters ? share : 0);
+    choice.add(!edge.refracted && contrast_of(edge).kind == kind ? share : 0);
   }
   if (!(choice.sum() > 0)) return 0;
   double squares = 0;
   for (int i = 0; i < kLooks; ++i) {
     const DiscreteDistribution::Draw draw = choice.sample((i + 0.5) / kLooks);
     const FilmEdgePoint point = point_on(pieces_[draw.index], draw.fraction);
-    const double over = of_emitters ? emitted_at(point.edge) : 1;
+    const double over = contrast_of(point.edge).unit;
     RayCount rays;
     Rgb<double> d;
     MirrorFaces by;
@@ -222,24 +241,26 @@ double CameraEdges::root_mean_square(bool of_emitters) const {
     } catch (const UntraceableRay&) {  // samples will count it
       continue;
     }
-    if (is_finite(d)) squares += (d.r * d.r + d.g * d.g + d.b * d.b) / (3 * over * over * kLooks);
+    if (is_finite(d) && over > 0)
+      squares += (d.r * d.r + d.g * d.g + d.b * d.b) / (3 * over * over * kLooks);
   }
   return std::sqrt(squares);
 }
 
 void CameraEdges::find_contrasts() {
-  const bool shines = std::ranges::any_of(
-      edges_, [&](const FilmEdge& edge) { return moves(edge) && emitted_at(edge) > 0; });
-  if (!shines || empty()) return;
-  of_emitters_ = root_mean_square(true);
-  of_others_ = root_mean_square(false);
+  std::array<bool, kKinds> any{};
+  for (const FilmEdge& edge : edges_)
+    if (moves(edge) && !edge.refracted) any[contrast_of(edge).kind] = true;
+  if (empty() || std::ranges::count(any, true) < 2) return;
+  for (int kind = 0; kind < kKinds; ++kind)
+    differences_[kind] = root_mean_square(static_cast<Kind>(kind));
   weigh({});
 }
 
-double CameraEdges::contrast(const FilmEdge& edge) const {
-  if (!(of_emitters_ > 0 && of_others_ > 0)) return 1;
-  const double emitted = emitted_at(edge);
-  return emitted > 0 ? of_emitters_ * emitted : of_others_;
+double CameraEdges::expected_difference(const FilmEdge& edge) const {
+  if (!(*std::ranges::max_element(differences_) > 0)) return 1;
+  const Contrast contrast = contrast_of(edge);
+  return differences_[contrast.kind] * contrast.unit;
 }
 
 // Projected length times speed times the difference that kinds of edges have; a share goes without
@@ -252,16 +273,18 @@ void CameraEdges::weigh(const FilmMotionAt& motion) {
   size_t refracted = 0;
   for (const Piece& piece : pieces_) {
     totals += piece.weight;
-    contrasts += piece.weight * contrast(edges_[piece.edge]);
+    contrasts += piece.weight * expected_difference(edges_[piece.edge]);
     refracted += edges_[piece.edge].refracted;
   }
   for (const Piece& piece : pieces_) {
-    const double by = contrast(edges_[piece.edge]);
+    const double by = expected_difference(edges_[piece.edge]);
     double share = 0;
     for (int k = 0; k < lanes_; ++k) {
       if (!(totals[k] > 0)) continue;
-      share +=
-          piece.weight[k] * (kLeastOfKind / totals[k] + (1 - kLeastOfKind) * by / contrasts[k]);
+      const double alike = piece.weight[k] / totals[k];
+      share += contrasts[k] > 0
+                   ? kLeastOfKind * alike + (1 - kLeastOfKind) * piece.weight[k] * by / contrasts[k]
+                   : alike;
     }
     if (edges_[piece.edge].refracted) share += kAlike / static_cast<double>(refracted);
     choice_.add(share);

@@ -1,6 +1,8 @@
 #pragma once
 // Edges on the film that are listed once: seen from a pinhole, or along the direction of an
 // orthographic camera, also by way of flat mirrors.
+#include <array>
+
 #include "integrators/terms/film_edges.h"
 #include "limn/core/discrete_distribution.h"
 
@@ -46,10 +48,20 @@ class CameraEdges final : public FilmEdges {
   void find_in_line(size_t first);
   // What a face around the edge emits, the brightest, as a mean of channels; 0: nothing.
   double emitted_at(const FilmEdge& edge) const;
-  // Looks at differences across some edges of emitters and across some others.
+  // What differs across an edge: what an emitter emits, what is seen of a surface and behind it, or
+  // only how two faces that are both seen are turned.
+  enum Kind { kEmitter, kOutline, kFold, kKinds };
+  struct Contrast {
+    Kind kind;
+    double unit;  // to which the radiance difference is in proportion, as far as is known
+  };
+  Contrast contrast_of(const FilmEdge& edge) const;
+  // The sine between normals of a fold; 1 where shading does not follow them.
+  double fold_at(const EdgeMesh& mesh, EdgeId edge) const;
+  // Looks at differences across some edges of each kind, if there are several.
   void find_contrasts();
-  double root_mean_square(bool of_emitters) const;
-  double contrast(const FilmEdge& edge) const;
+  double root_mean_square(Kind kind) const;
+  double expected_difference(const FilmEdge& edge) const;
   FilmEdgePoint point_on(const Piece& piece, double fraction) const;
   void weigh(const FilmMotionAt& motion);
   void add_pieces(uint32_t edge, const FilmMotionAt& motion);
@@ -58,9 +70,9 @@ class CameraEdges final : public FilmEdges {
   bool lists_all_ = false;
   std::vector<FilmEdge> edges_;  // that move, or all
   size_t moving_ = 0;
-  // The radiance difference to expect across an edge: of emitters, over what they emit.
-  double of_emitters_ = 0, of_others_ = 0;  // both 0: alike
-  std::vector<FilmLine> resting_;           // until what is in line with them is found
+  // The radiance difference to expect across an edge of each kind, over its unit; all 0: alike.
+  std::array<double, kKinds> differences_{};
+  std::vector<FilmLine> resting_;  // until what is in line with them is found
   Parting parting_;
   std::vector<Piece> pieces_;
   DiscreteDistribution choice_;  // of a piece

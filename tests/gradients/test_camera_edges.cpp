@@ -57,5 +57,56 @@ TEST(CameraEdges, OfBrightEmittersAreChosenMoreOften) {
   EXPECT_LT(dim.points, 0.1);
 }
 
+// The share of points on outlines of a flat-shaded ball, what lies there of the length of all, and
+// how many of its edges are sharp.
+struct OutlineShare {
+  double points, length;
+  uint64_t sharp;
+};
+OutlineShare share_of_outlines(const std::string& inner) {
+  const TempFiles files;
+  SceneParts parts;
+  parts.width = parts.height = 32;
+  parts.body = obj_shape("ball", write_mesh(files, "ball.obj", icosphere_mesh(2)), true, 0.8,
+                         {0.2, 1, 0}, inner) +
+               constant_light("sky", "0.2, 0.3, 0.4");
+  Scene scene = make_scene(files, parts);
+  find_parameter(scene, "ball.translate.x").seed(scene, 0);
+  const TracedScene traced(scene, 1, {.edges = true});
+  TermInput input(traced.context(), 1, {1, 1, 1, 1}, edge_sampler_type("silhouettes"), 1, false);
+  const CameraEdges edges(traced.context(), input.edges(), 1);
+  const EdgeMesh& mesh = input.edges().objects[0];
+  constexpr int kPoints = 4096;
+  OutlineShare share{0, 0, mesh.count(EdgeClass::kSharp)};
+  double length = 0;
+  for (int i = 0; i < kPoints; ++i) {
+    const auto point = edges.choose((i + 0.5) / kPoints, {});
+    if (!point) continue;
+    const bool outline = is_outline(mesh, point->edge.id.edge, value(scene.camera.origin));
+    share.points += outline / static_cast<double>(kPoints);
+    share.length += outline / point->density;
+    length += 1 / point->density;
+  }
+  share.length /= length;
+  return share;
+}
+
+TEST(CameraEdges, FoldsThatHardlyDifferAreChosenLess) {
+  const OutlineShare share = share_of_outlines(diffuse("clay", "0.2, 0.15, 0.1"));
+  EXPECT_GT(share.sharp, 100u);
+  EXPECT_LT(share.length, 0.2);
+  EXPECT_GT(share.points, 0.6);
+  EXPECT_LT(share.points, 0.95);  // folds keep a share that does not depend on differences
+}
+
+// Nothing is scattered, so how faces are turned is not seen: only outlines are edges.
+TEST(CameraEdges, OfBlackShapesHaveNoFolds) {
+  for (const std::string& light : {std::string(), area_light("glow", "5, 4, 3")}) {
+    const OutlineShare share = share_of_outlines(diffuse("soot", "0, 0, 0") + light);
+    EXPECT_EQ(share.sharp, 0u);
+    EXPECT_NEAR(share.points, 1, 1e-12);
+  }
+}
+
 }  // namespace
 }  // namespace limn
