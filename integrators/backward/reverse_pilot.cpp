@@ -37,6 +37,9 @@ constexpr double kKept = 0.5;
 // work to this share or less: for a lattice in front of a sky the pilot predicted 0.59 to 0.72 on
 // average, but one of five motions got 1.2 to 2.6.
 constexpr double kConvincing = 0.5;
+// `silhouettes` is taken if it is predicted to reduce squared error x work to this share, or less,
+// of what `forest` would run with. Not tuned.
+constexpr double kBetter = 0.9;
 // The edges that `forest` draws have rare and large samples, most of which a pilot
 // misses; listed silhouettes have none. So their variance is taken to be so many times what the
 // pilot finds: in gloss and beside a lamp of 1,886 faces, without it, one of two adjoints got
@@ -342,19 +345,23 @@ class Pilot {
     for (Candidate& candidate : candidates_) measure(candidate);
     if (candidates_.size() > 1) raise_unseen();
     const std::vector<double> units = candidates_[0].errors(candidates_[0].usual());
-    const double usual = candidates_[0].product(candidates_[0].usual(), units);
+    const Choice usual{candidates_[0].usual(),
+                       candidates_[0].product(candidates_[0].usual(), units)};
     Candidate* chosen = &candidates_[0];
+    // What `forest` would run with.
     Choice best = chosen->best(units);
+    bool gains = best.product < kConvincing * usual.product;
+    if (!gains) best = usual;
     if (candidates_.size() > 1) {
       const Choice listed = candidates_[1].best(units);
-      if (listed.product < best.product) {
+      if (listed.product < kBetter * best.product) {
         best = listed;
         chosen = &candidates_[1];
+        gains = true;
       }
     }
-    const bool gains = chosen != &candidates_[0] || best.product < kConvincing * usual;
     if (settings.seconds > 0) {
-      const double work = candidates_[0].work(candidates_[0].usual());
+      const double work = candidates_[0].work(usual.samples);
       const double ratio = gains && work > 0 ? chosen->work(best.samples) / work : 1;
       if (!leaves_time(settings, ratio)) {
         stay_below(settings);
@@ -368,7 +375,7 @@ class Pilot {
         "pilot of {} paths for each term: {} with {} numbers; squared error x work {:.3g} of that "
         "of forest with the usual numbers, if its edges vary {:g} times what was seen",
         kBatches * kPaths, plan.estimator->method_name(), gains ? "these" : "the usual",
-        gains && usual > 0 ? best.product / usual : 1.0, kUnseen);
+        usual.product > 0 ? best.product / usual.product : 1.0, kUnseen);
     return plan;
   }
 
@@ -419,18 +426,28 @@ class Pilot {
     }
   }
 
-  // Draws vary at least as much as what lists have in their place: between slats and a lamp 1,024
-  // paths may meet none of the draws that matter.
+  // All draws together vary at least as much as what lists have in their place: between slats and a
+  // lamp 1,024 paths may meet none of the draws that matter. Terms share what is missing evenly.
   void raise_unseen() {
-    for (ReverseFigures& drawn : candidates_[0].figures) {
-      if (!drawn.at_vertices) continue;
-      for (size_t d = 0; d < drawn.variances.size(); ++d) {
-        double listed = 0;
-        for (const ReverseFigures& figures : candidates_[1].figures)
-          if (figures.at_vertices) listed += figures.variances[d];
-        drawn.variances[d] = std::max(drawn.variances[d], kUnseen * listed);
-      }
+    const std::vector<double> drawn = at_vertices(candidates_[0]);
+    const std::vector<double> listed = at_vertices(candidates_[1]);
+    const auto terms = static_cast<double>(std::ranges::count_if(
+        candidates_[0].figures, [](const ReverseFigures& f) { return f.at_vertices; }));
+    for (ReverseFigures& figures : candidates_[0].figures) {
+      if (!figures.at_vertices) continue;
+      for (size_t d = 0; d < std::min(figures.variances.size(), listed.size()); ++d)
+        figures.variances[d] += std::max(0.0, kUnseen * listed[d] - drawn[d]) / terms;
     }
+  }
+  // Of all terms at vertices.
+  static std::vector<double> at_vertices(const Candidate& candidate) {
+    std::vector<double> sums;
+    for (const ReverseFigures& figures : candidate.figures) {
+      if (!figures.at_vertices) continue;
+      sums.resize(std::max(sums.size(), figures.variances.size()));
+      for (size_t d = 0; d < figures.variances.size(); ++d) sums[d] += figures.variances[d];
+    }
+    return sums;
   }
 
   const Stopwatch& watch_;
@@ -456,10 +473,18 @@ ReversePlan planned(const Scene& scene, const Image& adjoint, const BackwardOpti
     return ReversePlan{std::make_unique<ReverseEstimator>(scene, adjoint, own, settings.threads),
                        ""};
   };
-  const bool free = options.method->reverse->chooses && options.terms.empty() &&
-                    leaves_numbers(options) && !options.uniform_pixels &&
+  const bool chooses = options.method->reverse->chooses;
+  const bool free = chooses && options.terms.empty() && leaves_numbers(options) &&
+                    !options.uniform_pixels &&
                     !needs_times(scene, reverse_parameters(scene, options));
-  if (!free) return plain(without_pilot(options));
+  if (!free) {
+    ReversePlan plan = plain(without_pilot(options));
+    if (chooses && !leaves_numbers(options)) {
+      plan.decision = fmt::format("no pilot, since numbers of samples are given: {}",
+                                  plan.estimator->method_name());
+    }
+    return plan;
+  }
   return Pilot(scene, adjoint, options, settings, watch).plan(settings);
 }
 

@@ -14,7 +14,8 @@ namespace limn {
 struct ReversePlan {
   // With its numbers of samples.
   std::unique_ptr<ReverseEstimator> estimator;
-  std::string decision;  // for people to read; empty if there was nothing to decide
+  // For people to read; empty if there was nothing to decide, and nothing kept a pilot from it.
+  std::string decision;
 };
 
 // With the method that stands in for `adaptive` where there is no pilot; other methods stay.

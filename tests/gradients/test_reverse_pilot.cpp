@@ -1,10 +1,12 @@
 // What a pilot of reverse mode chooses, and that the run behind it is right.
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cmath>
 
 #include "limn/core/image.h"
 #include "limn/integrators/backward.h"
+#include "limn/integrators/parts.h"
 #include "support/meshes.h"
 #include "support/scenes.h"
 
@@ -26,21 +28,30 @@ Scene shadowed(const TempFiles& files, int width = 32, int height = 32) {
   return make_scene(files, parts);
 }
 
-BackwardResult run(const Scene& scene, const char* method, int spp, uint64_t seed, int threads = 2,
-                   double seconds = 0, int batches = 16) {
+Image wavy_adjoint(const Scene& scene) {
   Image adjoint(scene.film.crop_width, scene.film.crop_height, 3);
   for (size_t i = 0; i < adjoint.data.size(); ++i)
     adjoint.data[i] = static_cast<float>(std::sin(0.1 * static_cast<double>(i / 3)));
+  return adjoint;
+}
+
+BackwardOptions options_of(const char* method) {
   BackwardOptions options;
   options.parameters = {"body.translate.x", "body.translate.y", "body.rotate.z"};
   options.method = Method(method);
+  return options;
+}
+
+BackwardResult run(const Scene& scene, const char* method, int spp, uint64_t seed, int threads = 2,
+                   double seconds = 0, int batches = 16) {
+  BackwardOptions options = options_of(method);
   options.batches = batches;
   RunSettings settings;
   settings.seconds = seconds;
   settings.spp = spp;
   settings.seed = seed;
   settings.threads = threads;
-  return backward(scene, adjoint, options, settings);
+  return backward(scene, wavy_adjoint(scene), options, settings);
 }
 
 std::vector<double> means(const BackwardResult& result) {
@@ -66,6 +77,83 @@ TEST(ReversePilot, ChoosesAlikeOnAnyNumberOfThreads) {
   const BackwardResult three = run(scene, "adaptive", 96, 3, 3);
   EXPECT_EQ(one.decision, three.decision);
   EXPECT_EQ(means(one), means(three));
+}
+
+// With one sample less than the shortest run with a pilot there is none.
+TEST(ReversePilot, BeginsWithTheLeastSamples) {
+  const TempFiles files;
+  const Scene scene = shadowed(files);
+  int spp = 78;
+  while (run(scene, "adaptive", spp, 3).decision.empty()) ASSERT_LT(++spp, 96);
+  ASSERT_GT(spp, 78);
+  EXPECT_EQ(means(run(scene, "adaptive", spp - 1, 3)), means(run(scene, "forest", spp - 1, 3)));
+}
+
+TEST(ReversePilot, SaysThatNumbersKeepItOff) {
+  const TempFiles files;
+  const Scene scene = shadowed(files);
+  BackwardOptions options = options_of("adaptive");
+  options.camera_samples = 1;
+  RunSettings settings;
+  settings.spp = 2;
+  const auto decision = [&] {
+    return backward(scene, wavy_adjoint(scene), options, settings).decision;
+  };
+  EXPECT_EQ(decision(), "no pilot, since numbers of samples are given: forest");
+  options.method = Method("forest");
+  EXPECT_EQ(decision(), "");
+}
+
+// Every part makes the plan again, and it is that of the run.
+TEST(ReversePilot, ChoosesAlikeInParts) {
+  const TempFiles files;
+  const Scene scene = shadowed(files);
+  const BackwardOptions options = options_of("adaptive");
+  RunSettings settings;
+  settings.spp = 96;
+  settings.seed = 3;
+  const BackwardResult whole = backward(scene, wavy_adjoint(scene), options, settings);
+  ASSERT_NE(whole.decision, "");
+  std::vector<std::string> parts;
+  for (int part = 1; part <= 2; ++part) {
+    PartWriter writer({part, 2}, "", "");
+    settings.store = &writer;
+    const BackwardResult own = backward(scene, wavy_adjoint(scene), options, settings);
+    EXPECT_EQ(own.decision, whole.decision);
+    writer.finish();
+    parts.push_back(writer.bytes());
+  }
+  const auto joined = PartReader::of_bytes(parts);
+  settings.store = joined.get();
+  EXPECT_EQ(means(backward(scene, wavy_adjoint(scene), options, settings)), means(whole));
+}
+
+// An interrupted pilot leaves nothing; later, the batches that are done stay as they are.
+TEST(ReversePilot, CanBeInterrupted) {
+  const TempFiles files;
+  const Scene scene = shadowed(files);
+  std::atomic<bool> interrupted = true;
+  RunSettings settings;
+  settings.spp = 96;
+  settings.interrupted = &interrupted;
+  BackwardOptions options = options_of("adaptive");
+  EXPECT_EQ(backward(scene, wavy_adjoint(scene), options, settings).spp, 0);
+  interrupted = false;
+  std::vector<double> first;
+  options.each_batch = [&](int, const auto& sums) {
+    first.push_back(sums[0][0]);
+    interrupted = first.size() == 2;
+  };
+  const BackwardResult cut = backward(scene, wavy_adjoint(scene), options, settings);
+  EXPECT_NE(cut.decision, "");
+  EXPECT_EQ(cut.batches, 2);
+  std::vector<double> all;
+  options.each_batch = [&](int, const auto& sums) { all.push_back(sums[0][0]); };
+  interrupted = false;
+  backward(scene, wavy_adjoint(scene), options, settings);
+  ASSERT_EQ(first.size(), 2u);
+  ASSERT_GT(all.size(), 2u);
+  EXPECT_EQ(first, std::vector<double>(all.begin(), all.begin() + 2));
 }
 
 // The plan is that of a run without limit that has as many samples, also where the time has room

@@ -43,8 +43,8 @@ struct BackwardOptions {
   // this share of pairs of rays of a pixel meets surfaces apart; above 1: nowhere. Not tuned.
   double least_detail = 0.5;
   int edge_samples = 1;  // at every vertex of a path, of each term of edges; 65536 at most
-  // Points on the film, per path, of `camera`; 65536 at most. 0: a quarter, and with "analytic" one
-  // (README.md of integrators/backward has what other numbers did).
+  // Points on the film, per path, of `camera`; 65536 at most. 0: as a pilot chooses; without one a
+  // quarter, and with "analytic" one. Numbers of samples other than the defaults: no pilot.
   double camera_samples = 0;
   double shadow_samples = 1;  // the same of each of `shadow` and `penumbra`, but more than 0
   int batches = 16;           // at most, for standard errors; each ends with the adjoint of normals
@@ -71,7 +71,7 @@ struct ParameterAdjoint {
 struct BackwardResult {
   std::vector<ParameterAdjoint> parameters;  // in the order requested
   std::string method;                        // that ran: of adaptive the one that it chose
-  std::string decision;                      // what its pilot found; empty without one
+  std::string decision;                      // what its pilot found, or why numbers kept it off
   std::vector<TermRun> terms;                // all that the scene has
   int64_t spp = 0;                           // paths per pixel that were finished, on average
   int batches = 0;                           // that they came in, all of one size to a sample

@@ -23,17 +23,23 @@ void visit_options(Like<BackwardOptions> auto& o, auto&& visit, Task task = Task
             .with(&Option::flag, "uniform_pixels")
             .samples());
   visit(o.points, kPointsOption);
-  visit(o.edge_samples,
-        Option{"edge_samples", "Boundary samples per path vertex", 1, 1 << 16}.samples());
+  visit(
+      o.edge_samples,
+      Option{"edge_samples",
+             "Boundary samples per path vertex (other than the default: no pilot chooses numbers)",
+             1, 1 << 16}
+          .samples());
   visit(o.camera_samples,
-        Option{"camera_samples", "Boundary samples on the film per path (term camera)", 1e-6L,
-               1 << 16}
-            .or_zero("0.25, 1 with the method analytic")
+        Option{"camera_samples",
+               "Boundary samples on the film per path (term camera; given, no pilot chooses "
+               "numbers)",
+               1e-6L, 1 << 16}
+            .or_zero("a pilot's choice; without one 0.25, 1 with the method analytic")
             .samples());
   visit(o.shadow_samples,
         Option{"shadow_samples",
                "Boundary samples on the edges of visible shadows per path (terms shadow and "
-               "penumbra)",
+               "penumbra; other than the default: no pilot chooses numbers)",
                1e-6L, 1 << 16}
             .samples());
   if (task == Task::kFit) return;
