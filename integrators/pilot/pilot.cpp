@@ -80,17 +80,20 @@ class PilotRun {
     estimators_.push_back(std::move(pilot));
   }
 
-  // Samples [first, last); false if interrupted.
+  // Samples [first, last); false if interrupted. Each is a batch of its own: terms of the film are
+  // stratified over a batch, where more samples leave less than so many single ones.
   bool run(const RunSettings& settings, int first, int last, const Stopwatch& watch) {
     RunSettings quiet = settings;
     quiet.progress = nullptr;
     ProgressCounter progress(quiet, watch, 1);
     constexpr uint64_t kStream = 0x9110;  // any number
-    const Batch batch{mix_bits(settings.seed + kStream), first, last};
-    const auto sums = run_batch(estimators_, batch, settings.threads, progress);
-    if (sums.empty()) return false;
-    for (size_t slot = 0; slot < costs_.size(); ++slot) costs_[slot].merge(sums[0].costs[slot]);
-    for (size_t i = 0; i < film_.size(); ++i) film_[i].add_batch(sums[0].images[i], last - first);
+    for (int sample = first; sample < last; ++sample) {
+      const Batch batch{mix_bits(settings.seed + kStream), sample, sample + 1};
+      const auto sums = run_batch(estimators_, batch, settings.threads, progress);
+      if (sums.empty()) return false;
+      for (size_t slot = 0; slot < costs_.size(); ++slot) costs_[slot].merge(sums[0].costs[slot]);
+      for (size_t i = 0; i < film_.size(); ++i) film_[i].add_batch(sums[0].images[i], 1);
+    }
     return true;
   }
 

@@ -9,6 +9,7 @@
 #include "integrators/pilot/term_estimator.h"
 #include "limn/edgetree/edge_sampler_types.h"
 #include "support/meshes.h"
+#include "support/running_mean.h"
 #include "support/same_mean.h"
 #include "support/scenes.h"
 
@@ -519,6 +520,44 @@ TEST(Pilot, MergesFiguresOfMoreSamples) {
       EXPECT_NEAR(sum[cell], (3 * a[cell] + 7 * b[cell]) / 10, 1e-5 * (a[cell] + b[cell]));
   }
   EXPECT_NEAR(merged.light_work, all.light_work, 1e-9 * all.light_work);
+}
+
+// On the film a batch of many samples is stratified, and leaves less than as many of one.
+TEST(Pilot, FindsTheVarianceOfSingleSamplesOnTheFilm) {
+  const TempFiles files;
+  SceneParts parts;
+  parts.width = parts.height = 8;
+  parts.body = square("screen", 0.6, 20, {0.1, 0.9, 0}, diffuse("soot", "0.1, 0.1, 0.1")) +
+               make_sky(files, "sky");
+  const Scene scene = make_scene(files, parts);
+  const EdgeSamplerType& sampler = edge_sampler_type("silhouettes");
+  const auto terms = terms_of(scene, sampler);
+  const Parameter parameter = find_parameter(scene, "screen.translate.x");
+  std::vector<std::unique_ptr<SampleEstimator>> one;
+  one.push_back(std::make_unique<TermEstimator>(scene, std::span(&parameter, 1), terms,
+                                                std::vector<bool>(terms.size(), true), sampler, 1));
+  const auto& estimator = static_cast<const TermEstimator&>(*one[0]);
+  size_t camera = 0;
+  while (std::string(terms.at(camera)->name) != "camera") ++camera;
+  const Stopwatch watch;
+  RunSettings settings;
+  constexpr int kSamples = 16;
+  RunningMean found, single;
+  for (uint64_t seed = 1; seed <= 40; ++seed) {
+    settings.seed = seed;
+    const PilotFigures pilot = run_pilot(estimator, false, {0, kSamples}, settings, watch);
+    found.add(pilot.film_variance[camera][0]);
+    ProgressCounter progress(settings, watch, 1);
+    Moments image(film_size(scene.film));
+    for (int i = 0; i < kSamples; ++i)
+      image.add_batch(run_batch(one, {100 + seed, i, i + 1}, 1, progress).at(0).images[camera], 1);
+    double sum = 0;
+    for (size_t i = 0; i < image.size(); ++i) sum += image.variance(i) * kSamples;
+    single.add(sum * 3 / static_cast<double>(image.size()));
+  }
+  EXPECT_GT(single.mean(), 0);
+  EXPECT_LT(std::fabs(found.mean() - single.mean()),
+            4.5 * std::hypot(found.standard_error(), single.standard_error()));
 }
 
 // Three parameters are looked at two by two.
