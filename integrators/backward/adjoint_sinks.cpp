@@ -20,11 +20,11 @@ auto moving_corners(const Scene& scene) {
 
 bool VertexAdjoint::takes(const BoundaryForm& form, const Rng&) {
   form_ = &form;
-  return form.share > 0 && (motion_.moves(form) || !is_constant(p_) || form.by.count > 0);
+  return form.scale != 0 && (motion_.moves(form) || !is_constant(p_) || form.by.count > 0);
 }
 
 void VertexAdjoint::add(const Rgb<double>& amount) {
-  const double weight = weighed(adjoint_, amount) * form_->scale * form_->share;
+  const double weight = weighed(adjoint_, amount) * form_->scale;
   if (weight == 0) return;
   motion_.contribute(tape_, seeds_, *form_, weight);
   const Vec3d g = form_->of_ray() * weight;

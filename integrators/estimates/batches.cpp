@@ -182,7 +182,7 @@ class BatchRunner {
   static constexpr size_t kChunk = 1024;  // not tuned
 
   void run_film(size_t slot) {
-    constexpr size_t kHeld = 1024 * kChunk;  // samples in memory, 170 bytes each; not tuned
+    constexpr size_t kHeld = 1024 * kChunk;  // samples in memory, 220 bytes each; not tuned
     const FilmBatch batch(estimator_, slot, batch_);
     for (size_t begin = 0; begin < batch.count && !progress_.stopped(); begin += kHeld) {
       add_film_samples(slot, batch, begin, std::min(batch.count, begin + kHeld));
@@ -223,7 +223,8 @@ class BatchRunner {
       FilmSample sample;
       const FilmDraw draw = batch.draw(estimator_, slot, batch_, i);
       if (!estimator_.sample_film(slot, draw.u, draw.key, rays, sample)) continue;
-      if (is_finite(sample.value) && is_finite(sample.along_x) && is_finite(sample.along_y)) {
+      if (is_finite(sample.value) && is_finite(sample.along_x) && is_finite(sample.along_y) &&
+          is_finite(sample.amount)) {
         chunk.samples.emplace_back(batch.first + i, sample);
       } else {
         chunk.bad.add({-1, -1, static_cast<int64_t>(batch.first + i), estimator_.slot_name(slot)});
@@ -241,10 +242,12 @@ class BatchRunner {
     });
   }
 
-  Rgb<Lanes> value_for(int x, int y, const FilmSample& sample) const {
-    const FilmMotion* motion = estimator_.film_motion(x, y);
-    return motion ? sample.value_for(tapered(*motion, film_, x, y, sample.x, sample.y))
-                  : sample.value;
+  Rgb<Lanes> value_for(int x, int y, FilmSample sample) const {
+    if (const FilmMotion* motion = estimator_.film_motion(x, y)) {
+      sample.move(tapered(*motion, film_, x, y, sample.x, sample.y));
+    }
+    if (const Vec3<Lanes>* turn = estimator_.turn(x, y)) sample.turn(*turn);
+    return sample.value;
   }
   // Of the pixel that it lies in, or the nearest to it.
   Rgb<Lanes> own_value(const FilmSample& sample) const {

@@ -70,12 +70,16 @@ struct FilmSample {
                      // over the density of the sample [1 / pixel of length]
   // The same of a curve that moves by a pixel along x, or y, against the positions of samples.
   Rgb<double> along_x{}, along_y{};
+  // What turns of directions at the first vertex add (DirectionField::turn): amount times this.
+  Rgb<double> amount{};
+  Vec3d per_turn{};
 
-  // For a pixel whose positions move so.
-  Rgb<Lanes> value_for(const FilmMotion& motion) const {
-    Rgb<Lanes> result = value;
-    for (int c = 0; c < 3; ++c) result[c] += motion.x * -along_x[c] + motion.y * -along_y[c];
-    return result;
+  void move(const FilmMotion& motion) {
+    for (int c = 0; c < 3; ++c) value[c] += motion.x * -along_x[c] + motion.y * -along_y[c];
+  }
+  void turn(const Vec3<Lanes>& by) {
+    const Lanes rate = by.x * per_turn.x + by.y * per_turn.y + by.z * per_turn.z;
+    for (int c = 0; c < 3; ++c) value[c] += rate * amount[c];
   }
 };
 
@@ -183,6 +187,9 @@ class SampleEstimator {
   virtual double film_samples(size_t /*slot*/) const { return 0; }
   // How the positions of a pixel's samples on the film move; null if they are held.
   virtual const FilmMotion* film_motion(int /*x*/, int /*y*/) const { return nullptr; }
+  // How directions at the first vertices of a pixel's paths turn (DirectionField::turn); null if
+  // they are held.
+  virtual const Vec3<Lanes>* turn(int /*x*/, int /*y*/) const { return nullptr; }
   // Distinguishes the streams of different slots.
   virtual int film_stream(size_t /*slot*/) const { return 0; }
   virtual bool sample_film(size_t /*slot*/, double /*u*/, const Rng& /*key*/, RayCount& /*rays*/,

@@ -85,6 +85,11 @@ DirectionMotion MotionRates::motion_at(const Vec3d& p, const DirectionField& fie
   return {{field.turn * unit, axis}, {field.score * unit, axis}, !is_zero(field.score), unit};
 }
 
+Vec3d MotionRates::per_turn(const Vec3d& p, const Vec3d& to, const Vec3d& g) const {
+  const Vec3d axis = axis_at(p);
+  return (axis == Vec3d{} ? cross(to, g) : g * dot(axis, to)) * at(p);
+}
+
 double MotionRates::sliding(const Vec3<Lanes>& velocity) const {
   double speed = 0;
   for (int lane = 0; lane < kLanes; ++lane) {

@@ -78,6 +78,9 @@ class MotionRates {
   // The same as the camera sees it at p, if what it sees is so far away.
   double in_view(const Vec3d& p, double distance) const;
   DirectionMotion motion_at(const Vec3d& p, const DirectionField& field) const;
+  // g . dx/dt of a point x as directions at p carry it, over each number of a field's turn. to: the
+  // way from p to x.
+  Vec3d per_turn(const Vec3d& p, const Vec3d& to, const Vec3d& g) const;
   // How fast a vertex moves in units of what moves by itself: where a path meets a surface at a
   // grazing angle, it slides faster than any object.
   double sliding(const Vec3<Lanes>& velocity) const;

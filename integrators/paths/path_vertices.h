@@ -91,7 +91,7 @@ inline void PathTracer<S, Visitor>::draw_numbers(std::span<Walk* const> walks) c
 // After a path has been given its next direction, of this density (see PathStep).
 template <class S, class Visitor>
 inline bool PathTracer<S, Visitor>::goes_on(Walk& walk, double pdf) const {
-  walk.step = {value(walk.surface.p), pdf};
+  walk.step = {value(walk.surface.p), pdf, walk.surface.face, walk.step.from};
   walk.last = is_complete(walk.bounces + 1);
   return !walk.last || c_.lights.on_shapes() || c_.scene.environment;
 }

@@ -22,6 +22,8 @@ struct PathStep {
   Vec3d from;  // the vertex before, or where the camera's ray starts
   // Of the direction from there [1/sr]; 0 for what the camera, an edge or a smooth lobe sees.
   double pdf = 0;
+  FaceRef face = {};  // of the vertex before
+  Vec3d before = {};  // where the path came to that from
 };
 
 // What a path has found.

@@ -23,6 +23,7 @@ class ProbingEstimator : public SampleEstimator {
     return terms_.sample_film(slot, u, key, rays, sample);
   }
   const FilmMotion* film_motion(int x, int y) const override { return terms_.film_motion(x, y); }
+  const Vec3<Lanes>* turn(int x, int y) const override { return terms_.turn(x, y); }
 
  protected:
   const TermEstimator& terms_;

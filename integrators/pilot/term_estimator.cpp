@@ -333,7 +333,7 @@ void TermEstimator::add_path(const PixelSample& at, const Path& path, double wei
 bool TermEstimator::sample_film(size_t slot, double u, const Rng& key, RayCount& rays,
                                 FilmSample& sample) const {
   try {
-    FilmLanes lanes(scene_, !plan_.film.empty(), sample);
+    FilmLanes lanes(scene_, !plan_.film.empty(), plan_.fields.empty() ? nullptr : &rates_, sample);
     terms_[slot]->sample_film(u, key, lanes);
     rays.closest += lanes.cost().rays - lanes.cost().shadow_rays;
     rays.shadow += lanes.cost().shadow_rays;

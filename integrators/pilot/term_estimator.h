@@ -94,6 +94,10 @@ class TermEstimator final : public SampleEstimator {
   bool sample_film(size_t slot, double u, const Rng& key, RayCount& rays,
                    FilmSample& sample) const override;
   const FilmMotion* film_motion(int x, int y) const override { return plan_.film_motion(x, y); }
+  const Vec3<Lanes>* turn(int x, int y) const override {
+    const DirectionField* field = plan_.field_at({x, y, 0});
+    return field ? &field->turn : nullptr;
+  }
 
  private:
   class VertexTerms;

@@ -38,11 +38,16 @@ struct MovingLift {
   std::array<Vec3d, 3> of_corners, of_normals;
 };
 
+// How a camera's path turns: directions at its first vertex, here, may (direction_field.h).
+struct FirstTurn {
+  Vec3d vertex, to;  // and the way to the point x that the vertex sees
+  Vec3d g;           // the rate has g . velocity of x as they carry it
+};
+
 struct BoundaryForm {
   Vec3d x;              // on the viewer's ray
   double distance = 0;  // of x from the viewer
   double scale = 1;
-  double share = 1;   // counts for velocities, not for what turning directions change
   bool held = false;  // the ray's direction does not turn with those of the path
   std::array<MovingPoint, 5> points;
   int count = 0;
@@ -51,6 +56,7 @@ struct BoundaryForm {
   // this unit direction, from a vertex.
   MirrorFaces by;
   Vec3d leaves = {};
+  std::optional<FirstTurn> turned;  // of samples of the film
 
   void add_edge(const EdgeMesh& mesh, EdgeRef edge, double t, const Vec3d& g) {
     points[count++] = {MovingPoint::Of::kEdge, &mesh, edge, t, {}, nullptr, g};
@@ -63,6 +69,9 @@ struct BoundaryForm {
   // omega and the face's normal.
   double add_seen_point(const Scene& scene, FaceRef face, const Vec3d& omega, const Vec3d& g);
   std::span<const MovingPoint> all() const { return {points.data(), static_cast<size_t>(count)}; }
+  // The vertex, the first of a path, sees x in directions that turn. Before the camera's view of it
+  // is added.
+  void turn_at(const Vec3d& vertex, const Vec3d& to) { turned = {vertex, to - vertex, of_ray()}; }
   // What v_ray has: minus the sum of g. Normals, and the direction of a light at infinity, are no
   // points.
   Vec3d of_ray() const;

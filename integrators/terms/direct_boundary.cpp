@@ -27,7 +27,7 @@ class DirectTerm final : public Term {
       : context_(input.context),
         edges_(input.edges()),
         regions_(*input.regions()),
-        emitter_edges_(*input.emitter_edges()),
+        ways_(emitter_ways(context_, edges_, regions_, *input.emitter_edges())),
         direct_(edges_, input.edge_sampler(), regions_) {}
 
   bool uses_vertices() const override { return true; }
@@ -40,7 +40,7 @@ class DirectTerm final : public Term {
   const PathContext& context_;
   const EdgeSamplerInput& edges_;
   const LightRegions& regions_;
-  const EmitterEdges& emitter_edges_;
+  EmitterWays ways_;
   DirectEdges direct_;
 };
 
@@ -63,11 +63,10 @@ void DirectTerm::add_at_vertex(const PathVertex& vertex, int samples, BoundarySi
   }
   direct_.draw(pieces, vertex.key, vertex.bounces, samples, sink.cost(), points);
   for (const DirectPoint& point : points) {
-    const double share =
-        is_lifted(context_.scene, vertex.surface.face.shape)
-            ? 1
-            : direct_share({context_.scene, edges_, regions_, emitter_edges_}, point.sample,
-                           point.region, vertex.surface, vertex.step, vertex.bounces);
+    const double share = is_lifted(context_.scene, vertex.surface.face.shape)
+                             ? 1
+                             : direct_share(ways_, point.sample, point.region, vertex.surface,
+                                            vertex.step, vertex.bounces);
     const EdgeDraw draw{edges_.object(point.sample.edge.object),
                         point.sample,
                         {&regions_, point.region},

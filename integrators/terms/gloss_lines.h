@@ -4,8 +4,8 @@
 // other surfaces see it so: pixels rarely meet them. So a point of the edge is drawn first, then a
 // direction into which the face scatters the light. It meets the vertex q that sees the edge, where
 // what the edge adds over this density is bounded. Both ways to the edge and q share the samples by
-// the power heuristic; any shares that add up to one are right. Of vertices on surfaces with
-// interpolated normals, and of what turning directions change, vertices have all.
+// the power heuristic; any shares that add up to one are right. Vertices on surfaces with
+// interpolated normals have all of theirs.
 #include <optional>
 #include <vector>
 

@@ -76,10 +76,7 @@ Lanes rate_of_lift(const Scene& scene, const BoundaryForm& form, const RayMotion
 
 Lanes rate_of(const Scene& scene, const BoundaryForm& form, const RayMotion& ray) {
   const auto of_point = [&](const MovingPoint& point) {
-    Vec3<Lanes> v = relative_velocity(scene, form, point, ray);
-    if (form.share != 1) {
-      v = v * form.share - ray.turn.velocity(form.x - ray.origin) * (1 - form.share);
-    }
+    const Vec3<Lanes> v = relative_velocity(scene, form, point, ray);
     // A light at infinity is no point that the ray carries.
     const bool infinite = point.light && point.light->origin().infinite;
     return along(infinite ? v : v - ray.direction * form.distance, point.g);
@@ -156,8 +153,7 @@ void VertexLanes::add(const Rgb<double>& amount) {
   if (turned_) {
     const Vec3d from = vertex_.surface.p;
     const Vec3<Lanes> turn = form_->held ? Vec3<Lanes>{} : turned_->turn.velocity(form_->x - from);
-    const Lanes swept =
-        along(turned_->velocity * form_->share + turn, form_->of_ray()) * form_->scale;
+    const Lanes swept = along(turned_->velocity + turn, form_->of_ray()) * form_->scale;
     for (int c = 0; c < 3; ++c) turned_->sum[c] += swept * amount[c];
   }
   if (log()) {
@@ -178,12 +174,17 @@ bool FilmLanes::takes(const BoundaryForm& form, const Rng&) {
   const auto ray = ray_at(CameraView<Dual>(scene_.camera), place_);
   rate_ = rate_of(scene_, form,
                   {value(ray.origin), velocity_of(ray.origin), {}, velocity_of(ray.direction)});
-  return !is_zero(rate_) || moves_film_;
+  return !is_zero(rate_) || moves_film_ || (rates_ && form.turned);
 }
 
 void FilmLanes::add(const Rgb<double>& amount) {
   added_ = true;
   sample_.value = {rate_ * amount.r, rate_ * amount.g, rate_ * amount.b};
+  if (rates_ && form_->turned) {
+    const auto& [vertex, to, g] = *form_->turned;
+    sample_.amount = amount * form_->scale;
+    sample_.per_turn = rates_->per_turn(vertex, to, g);
+  }
   if (!moves_film_) return;
   const auto ray = shifted_ray(scene_.camera, {{sample_.x, sample_.y}});
   const Vec3<Lanes> v = velocity_of(ray.origin) + velocity_of(ray.direction) * form_->distance;

@@ -75,9 +75,9 @@ class VertexLanes final : public BoundarySink {
 // One sample of the film.
 class FilmLanes final : public FilmSink {
  public:
-  // moves_film: positions on the film may move.
-  FilmLanes(const Scene& scene, bool moves_film, FilmSample& sample)
-      : scene_(scene), moves_film_(moves_film), sample_(sample) {
+  // moves_film: positions on the film may move. rates: as directions do; null: they are held.
+  FilmLanes(const Scene& scene, bool moves_film, const MotionRates* rates, FilmSample& sample)
+      : scene_(scene), moves_film_(moves_film), rates_(rates), sample_(sample) {
     book_on(own_);
   }
   bool added() const { return added_; }
@@ -90,6 +90,7 @@ class FilmLanes final : public FilmSink {
  private:
   const Scene& scene_;
   bool moves_film_;
+  const MotionRates* rates_;
   FilmSample& sample_;
   FilmPlace place_;
   TermCost own_;

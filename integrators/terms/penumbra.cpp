@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <bit>
 
-#include "integrators/film/film_point.h"
 #include "integrators/lights/light_regions.h"
+#include "integrators/terms/seen_vertex.h"
 
 namespace limn {
 
@@ -152,9 +152,31 @@ double EmitterEdges::probability(size_t k, EdgeRef edge) const {
   return listed_[block.before + std::popcount(block.listed & (bit - 1))].probability;
 }
 
+EmitterWays emitter_ways(const PathContext& context, const EdgeSamplerInput& edges,
+                         const LightRegions& regions, const EmitterEdges& emitter_edges) {
+  constexpr double kScattered = 0.25;  // not tuned
+  const int max_depth = context.scene.max_depth;
+  const bool scatters = (max_depth < 0 || max_depth > 2) && !context.straight_ways;
+  return {context.scene, edges, regions, emitter_edges, scatters ? kScattered : 0};
+}
+
+// Lines leave p on the side that they came to. Paths share the vertices of surfaces with smooth
+// lobes by probabilities of their own.
+double scattered_density(const Scene& scene, const EmitterLine& line, const PathStep& step) {
+  if (!step.face.shape.valid()) return 0;
+  const auto smooth = [](const Bsdf* bsdf) { return bsdf && bsdf->lobes().smooth; };
+  const Bsdf& bsdf = *scene.shape(step.face.shape).bsdf;
+  if (is_lifted(scene, step.face.shape) || smooth(bsdf.side(true)) || smooth(bsdf.side(false))) {
+    return 0;
+  }
+  if (!(dot(line.n, step.from - line.p) * dot(line.n, line.e - line.p) > 0)) return 0;
+  // Not by the cosine: seen at a grazing angle a moving p slides by one over it.
+  return film_density(scene, line.p, 1 / (2 * kPi), step.face, step.from, step.from - step.before);
+}
+
 PenumbraShare penumbra_share(const EmitterWays& ways, const EmitterLine& line, const PathStep& step,
                              int bounces) {
-  const auto& [scene, edges, regions, emitter_edges] = ways;
+  const auto& [scene, edges, regions, emitter_edges, scattered] = ways;
   if (bounces > 0 && !(step.pdf > 0)) return {};
   const double probability = emitter_edges.probability(line.region, line.edge);
   const Vec3d through = line.e - line.p;
@@ -174,10 +196,14 @@ PenumbraShare penumbra_share(const EmitterWays& ways, const EmitterLine& line, c
   // are drawn for the whole film; at p, four points on the edges that cross an emitter that is seen
   // beside e with a width of |p - e| / sqrt(pdf), or less.
   double lines = probability * result.density, points = step.pdf;
+  const double pixels = static_cast<double>(scene.film.crop_width) * scene.film.crop_height;
+  double more = 0;  // scattered lines for one from the vertex before
   if (bounces == 0) {
-    const double pixels = static_cast<double>(scene.film.crop_width) * scene.film.crop_height;
-    lines *= pixels / film_per_solid_angle(scene.camera, sight / distance, distance);
+    lines *=
+        (1 - scattered) * pixels / film_per_solid_angle(scene.camera, sight / distance, distance);
     points = 1;
+  } else if (bounces == 1 && scattered > 0) {
+    more = scattered * pixels * scattered_density(scene, line, step);
   }
   const auto& ends = edges.object(line.edge.object).edge(line.edge.edge).vertices;
   const EdgeMesh& mesh = edges.object(line.edge.object);
@@ -185,7 +211,10 @@ PenumbraShare penumbra_share(const EmitterWays& ways, const EmitterLine& line, c
   points *= 4 * std::sqrt(pdf) / behind;
   // Where one way hardly comes, the little that it would be left with is a rare event.
   const double ratio = points / lines;
-  result.share = std::isfinite(lines) ? 1 / (1 + ratio * ratio) : 0;
+  if (!std::isfinite(lines) || !std::isfinite(ratio) || !std::isfinite(more)) return result;
+  const double others = 1 + ratio * ratio, squared = more * more;
+  result.share = 1 / (others + squared);
+  result.scattered = 1 / (1 + others / squared);
   return result;
 }
 
@@ -195,7 +224,8 @@ double direct_share(const EmitterWays& ways, const EdgeSample& sample, size_t k,
   const auto& ends = mesh.edge(sample.edge.edge).vertices;
   const Vec3d e = mesh.position(ends[0]) * (1 - sample.t) + mesh.position(ends[1]) * sample.t;
   const EmitterLine line{k, sample.edge, e, at.p, at.n_g};
-  return 1 - penumbra_share(ways, line, step, bounces).share;
+  const PenumbraShare of = penumbra_share(ways, line, step, bounces);
+  return 1 - of.share - of.scattered;
 }
 
 }  // namespace limn

@@ -4,10 +4,11 @@
 // samples of pixels and of directions meet it ever more rarely. So what `direct` holds is found
 // from both ends: `direct` itself lists edges at the vertices that paths come to; `penumbra` draws
 // lines from an emitter through a point of an edge to a vertex, and finds who sees that
-// (penumbra_boundary.cpp). Each contribution is shared between the two by how densely they are
-// expected to meet it (the power heuristic; any shares that add up to one are right). Rays leave
-// surfaces with interpolated normals above their faces (surface_point.h), where lines do not end:
-// `direct` has all of theirs.
+// (penumbra_boundary.cpp). Close to a second vertex the first is found from there, too: a share of
+// the samples of the film scatter a line on to what the camera sees. Each contribution is shared
+// between these ways by how densely they are expected to meet it (the power heuristic; any shares
+// that add up to one are right). Rays leave surfaces with interpolated normals above their faces
+// (surface_point.h), where lines do not end: `direct` has all of theirs.
 #include <span>
 #include <vector>
 
@@ -91,16 +92,23 @@ struct EmitterWays {
   const EdgeSamplerInput& edges;
   const LightRegions& regions;
   const EmitterEdges& emitter_edges;
+  double scattered = 0;  // the share of the samples of the film whose lines are scattered once
 };
+EmitterWays emitter_ways(const PathContext& context, const EdgeSamplerInput& edges,
+                         const LightRegions& regions, const EmitterEdges& emitter_edges);
 
 struct PenumbraShare {
-  double density = 0;  // of p as seen from the vertex before [1/sr], if lines through e are drawn
-  double share = 0;    // of `penumbra`; the rest is that of `direct`
+  double density = 0;    // of p as seen from the vertex before [1/sr], if lines through e are drawn
+  double share = 0;      // of lines that this vertex, or the camera, sees
+  double scattered = 0;  // of lines that are scattered from p; `direct` has the rest
 };
 // step: how a path came to p, after how many bounces: by the density of directions, or of positions
 // in a pixel if it comes from the camera.
 PenumbraShare penumbra_share(const EmitterWays& ways, const EmitterLine& line, const PathStep& step,
                              int bounces);
+// The density on the film [1 / pixel^2] of the vertex before, of lines that are scattered from p
+// alike in all directions; 0 where they do not end.
+double scattered_density(const Scene& scene, const EmitterLine& line, const PathStep& step);
 // The share of `direct` in what a point of an edge before region k adds at a vertex.
 double direct_share(const EmitterWays& ways, const EdgeSample& sample, size_t k,
                     const SurfacePoint<double>& at, const PathStep& step, int bounces);

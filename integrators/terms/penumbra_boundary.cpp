@@ -4,8 +4,8 @@
 // with C its integrand. Here a point e(t) of an edge is drawn first, then a line through it from a
 // direction where region k lies; behind e it meets p, in whose direction omega its density is
 //   pdf(line) (|n . line| / |p - e|^2) / (|n . omega| / |p - q|^2) :
-// the estimate C over all densities stays bounded where emitter and distance vanish. What the turn
-// of directions at p changes is left to `direct`.
+// the estimate C over all densities stays bounded where emitter and distance vanish. Where q is a
+// vertex close to p it is found by a line from p, whose density goes with 1 / |p - q|^2, too.
 #include <fmt/format.h>
 
 #include "integrators/film/film_point.h"
@@ -52,6 +52,8 @@ class PenumbraTerm final : public Term {
   }
 
  private:
+  // Of the film: a line that is scattered to the vertex before.
+  void add_scattered(double u, const Rng& key, FilmSink& sink) const;
   // viewer: the vertex before.
   void add_sample(const PathVertex& viewer, const Rng& key, BoundarySink& sink) const;
   // The line seen from q, for a path of this throughput.
@@ -66,6 +68,9 @@ class PenumbraTerm final : public Term {
 };
 
 void PenumbraTerm::sample_film(double u, const Rng& key, FilmSink& sink) const {
+  const double scattered = lines_.ways().scattered;
+  if (u < scattered) return add_scattered(u / scattered, key, sink);
+  u = (u - scattered) / (1 - scattered);
   Rng rng = key.at(Purpose::kShadow, 0);
   RayCount rays;
   auto drawn = lines_.draw(u, rng, rays);
@@ -80,9 +85,38 @@ void PenumbraTerm::sample_film(double u, const Rng& key, FilmSink& sink) const {
   const bool hidden = is_hidden(context_, *seen, drawn->face, shadow);
   sink.cost().add(shadow);
   if (hidden) return;
-  drawn->edge.probability /=
-      film_per_solid_angle(context_.scene.camera, seen->omega, seen->distance);
+  drawn->edge.probability *=
+      (1 - scattered) / film_per_solid_angle(context_.scene.camera, seen->omega, seen->distance);
   add(*drawn, from, {seen->omega, seen->distance}, grey(1.0), 0, key, sink);
+}
+
+void PenumbraTerm::add_scattered(double u, const Rng& key, FilmSink& sink) const {
+  const Scene& scene = context_.scene;
+  Rng rng = key.at(Purpose::kShadow, 0);
+  RayCount rays;
+  auto drawn = lines_.draw(u, rng, rays);
+  const double u_0 = rng.uniform(), u_1 = rng.uniform();
+  const auto viewer =
+      drawn ? lines_.scatter(*drawn, u_0, u_1, sample_lens(scene.camera, key), rays) : std::nullopt;
+  sink.cost().add(rays);
+  if (!viewer || !sink.at(viewer->seen.at)) return;
+  const auto& [face, q, seen] = *viewer;
+  const Vec3d from = value(seen.ray.origin);
+  const auto surface = surface_on_ray<double>(scene, face, from, seen.omega);
+  const Scattering<double> scattering(surface, -seen.omega, scene.shading);
+  if (scattering.black()) return;
+  const PathVertex vertex{surface, scattering, grey(1.0), {}, {}, 0, {from}, key};
+  const Vec3d to = drawn->line.p - q;
+  const SeenAlong along{to / length(to), length(to), &*viewer};
+  const PathStep step = lines_.step_from(vertex, along.omega);
+  const Rgb<double> f = step.pdf > 0 ? scattering.eval_value(along.omega) : Rgb<double>{};
+  if (is_black(f) || !lines_.complete(*drawn, step, 1, rng, true)) return;
+  RayCount shadow;
+  const bool hidden = is_hidden(context_, seen, face, shadow);
+  sink.cost().add(shadow);
+  if (hidden) return;
+  drawn->edge.probability *= lines_.ways().scattered * scattered_density(scene, drawn->line, step);
+  add(*drawn, q, along, f, 1, key, sink);
 }
 
 void PenumbraTerm::add_sample(const PathVertex& viewer, const Rng& key, BoundarySink& sink) const {
@@ -107,6 +141,7 @@ void PenumbraTerm::add(const DrawnLine& drawn, const Vec3d& q, const SeenAlong& 
   vertex.below = scattering.passes(drawn.line.e - drawn.line.p);
   EdgeDraw draw{
       edges_.object(drawn.edge.edge.object), drawn.edge, {&regions_, drawn.line.region}, key};
+  draw.held = regions_.shape(drawn.line.region).valid();
   draw.along = &along;
   add_edge_point(context_, vertex, draw, sink);
 }

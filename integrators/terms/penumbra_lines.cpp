@@ -9,13 +9,13 @@
 namespace limn {
 
 std::optional<DrawnLine> PenumbraLines::draw(double u, Rng& rng, RayCount& rays) const {
-  const EmitterEdges::Drawn emitter_edge = emitter_edges_.draw(u);
+  const EmitterEdges::Drawn emitter_edge = ways_.emitter_edges.draw(u);
   const double t = rng.uniform(), u1 = rng.uniform(), u2 = rng.uniform();
   const EdgeRef id = emitter_edge.edge;
-  const EdgeMesh& mesh = edges_.object(id.object);
+  const EdgeMesh& mesh = ways_.edges.object(id.object);
   const auto& ends = mesh.edge(id.edge).vertices;
   const Vec3d e = mesh.position(ends[0]) * (1 - t) + mesh.position(ends[1]) * t;
-  const auto omega = regions_.draw_direction(emitter_edge.region, e, u1, u2);
+  const auto omega = ways_.regions.draw_direction(emitter_edge.region, e, u1, u2);
   if (!omega) return {};
   Ray ray{e, -*omega};
   const FacesAround around = mesh.around(id.edge);
@@ -33,13 +33,36 @@ std::optional<DrawnLine> PenumbraLines::draw(double u, Rng& rng, RayCount& rays)
       {id, t, emitter_edge.probability, 1}, hit.face, {emitter_edge.region, id, e, p, n}};
 }
 
-bool PenumbraLines::complete(DrawnLine& drawn, const PathStep& step, int bounces, Rng& rng) const {
+bool PenumbraLines::complete(DrawnLine& drawn, const PathStep& step, int bounces, Rng& rng,
+                             bool scattered) const {
   constexpr double kLeastShare = 0.1;  // lines of less go on by roulette; not tuned
-  const auto [density, share] =
-      penumbra_share({context_.scene, edges_, regions_, emitter_edges_}, drawn.line, step, bounces);
+  const PenumbraShare of = penumbra_share(ways_, drawn.line, step, bounces);
+  const double share = scattered ? of.scattered : of.share;
   if (!(rng.uniform() * kLeastShare < share)) return false;
-  drawn.edge.probability *= density / std::max(share, kLeastShare);
+  drawn.edge.probability *= of.density / std::max(share, kLeastShare);
   return true;
+}
+
+std::optional<SeenVertex> PenumbraLines::scatter(const DrawnLine& drawn, double u_0, double u_1,
+                                                 const LensPoint& lens, RayCount& rays) const {
+  const auto& [region, edge, e, p, n] = drawn.line;
+  const double height = 1 - u_0, radius = std::sqrt(u_0 * (2 - u_0)), angle = 2 * kPi * u_1;
+  const Vec3d local{radius * std::cos(angle), radius * std::sin(angle), height};
+  Ray ray{p, normalize(Frame(dot(n, e - p) < 0 ? -n : n).to_world(local))};
+  ray.start = drawn.face;
+  Hit hit;
+  ++rays.closest;
+  if (!context_.tracer.closest(ray, hit)) return {};
+  const auto met = surface_on_ray<double>(context_.scene, hit.face, ray.origin, ray.direction);
+  return seen_vertex(context_.scene, hit.face, met.p, lens);
+}
+
+PathStep PenumbraLines::step_from(const PathVertex& vertex, const Vec3d& omega) const {
+  double pdf = vertex.scattering.pdf_solid_angle(omega);
+  if (const MirroredLight* mirrored = context_.mirrored; mirrored && pdf > 0) {
+    pdf = MirroredLight::pdf(mirrored->mixture(vertex.surface, vertex.scattering), omega, pdf);
+  }
+  return {vertex.surface.p, pdf, vertex.surface.face, vertex.step.from};
 }
 
 std::optional<SeenLine> PenumbraLines::seen_from(const PathVertex& vertex, const Rng& key,
@@ -60,12 +83,9 @@ std::optional<SeenLine> PenumbraLines::seen_from(const PathVertex& vertex, const
   const double distance = length(to);
   const bool apart = distance > 0 && drawn->face != vertex.surface.face;
   const Vec3d omega = apart ? to / distance : Vec3d{};
-  double pdf = apart ? vertex.scattering.pdf_solid_angle(omega) : 0;
-  if (const MirroredLight* mirrored = context_.mirrored; mirrored && pdf > 0) {
-    pdf = MirroredLight::pdf(mirrored->mixture(vertex.surface, vertex.scattering), omega, pdf);
-  }
-  const Rgb<double> f = pdf > 0 ? vertex.scattered(omega) : Rgb<double>{};
-  if (is_black(f) || !complete(*drawn, {q, pdf}, vertex.bounces + 1, rng)) {
+  const PathStep step = apart ? step_from(vertex, omega) : PathStep{};
+  const Rgb<double> f = step.pdf > 0 ? vertex.scattered(omega) : Rgb<double>{};
+  if (is_black(f) || !complete(*drawn, step, vertex.bounces + 1, rng)) {
     ++cost.zero_weight;
     return {};
   }

@@ -25,17 +25,21 @@ inline std::optional<SeenVertex> seen_vertex(const Scene& scene, FaceRef face, c
   return SeenVertex{face, q, *seen};
 }
 
-// The density on the film [1 / pixel^2] of a vertex that is met by lines from x. by_angle: that of
-// their directions at x [1/sr].
+// The density on the film [1 / pixel^2] of a vertex q of a face that is met by lines from x.
+// by_angle: that of their directions at x [1/sr]. sight: from where the camera's ray starts to q.
+inline double film_density(const Scene& scene, const Vec3d& x, double by_angle, FaceRef face,
+                           const Vec3d& q, const Vec3d& sight) {
+  const auto c = face_corners<double>(scene.shape(face.shape).mesh, face.face);
+  const Vec3d n = cross(c[1] - c[0], c[2] - c[0]), way = q - x;
+  const double distance = length(sight), r2 = length_squared(way);
+  const Vec3d omega = sight / distance;
+  return by_angle * std::fabs(dot(n, way)) / (std::sqrt(r2) * r2) * distance * distance /
+         (std::fabs(dot(n, omega)) * film_per_solid_angle(scene.camera, omega, distance));
+}
 inline double film_density(const Scene& scene, const Vec3d& x, double by_angle,
                            const SeenVertex& vertex) {
-  const auto c = face_corners<double>(scene.shape(vertex.face.shape).mesh, vertex.face.face);
-  const Vec3d n = cross(c[1] - c[0], c[2] - c[0]), way = vertex.q - x;
-  const FilmPoint& seen = vertex.seen;
-  const double r2 = length_squared(way), cosine = std::fabs(dot(n, way)) / std::sqrt(r2);
-  return by_angle * cosine / r2 * seen.distance * seen.distance /
-         (std::fabs(dot(n, seen.omega)) *
-          film_per_solid_angle(scene.camera, seen.omega, seen.distance));
+  return film_density(scene, x, by_angle, vertex.face, vertex.q,
+                      vertex.seen.omega * vertex.seen.distance);
 }
 
 }  // namespace limn

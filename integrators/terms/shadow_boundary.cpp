@@ -53,7 +53,8 @@ class ShadowTerm final : public Term {
         frames_(context_.scene, input.edges()),
         input_(frames_.edges()),
         edges_(context_, frames_, input.lanes),
-        lines_(context_, input_) {
+        lines_(context_, input_),
+        warps_(input.warps) {
     if (edges_.empty() || !is_seen_again()) return;
     const Stopwatch watch;
     pieces_.emplace(context_, input_, edges_.edges(), input.free != nullptr, input.threads);
@@ -99,8 +100,9 @@ class ShadowTerm final : public Term {
   bool is_seen_again() const {
     return context_.scene.max_depth < 0 || context_.scene.max_depth > 2;
   }
-  // Lines find no vertex that sees the shadow straight through a surface.
-  bool draws_lines() const { return pieces_ && !context_.straight_ways; }
+  // Lines find no vertex that sees the shadow straight through a surface, and do not know how
+  // directions are warped.
+  bool draws_lines() const { return pieces_ && !context_.straight_ways && !warps_; }
   void add_samples(const PathVertex& vertex, int samples, BoundarySink& sink) const;
   // A vertex of a path, and what of it lines may find.
   struct Viewer {
@@ -124,6 +126,7 @@ class ShadowTerm final : public Term {
   const EdgeSamplerInput& input_;
   ShadowEdges edges_;
   ShadowLines lines_;
+  bool warps_;
   std::optional<ShadowPieces> pieces_;
   double piece_seconds_ = 0;
 };
@@ -208,10 +211,11 @@ void ShadowTerm::add_sample(const Viewer& viewer, const ShadowDraw& draw, const 
   double by_pieces = draw.density;
   if (!is_black(amount)) {
     if (pieces_ && by_pieces < 0) by_pieces = pieces_->density(viewer.query, draw.edge, draw.t);
-    form = sweep(edge, *point, {omega, distance}, 1 / density(draw, by_pieces));
+    double share = 1;
     if (viewer.by_lines) {
-      form.share -= lines_.share(edge, edges_.probability(draw.edge), *point, *viewer.by_lines);
+      share -= lines_.share(edge, edges_.probability(draw.edge), *point, *viewer.by_lines);
     }
+    form = sweep(edge, *point, {omega, distance}, share / density(draw, by_pieces));
   }
   if (is_black(amount) || !sink.takes(form, key)) {
     ++cost.zero_weight;
@@ -298,6 +302,7 @@ void ShadowTerm::add_line(double u, const Rng& key, FilmSink& sink) const {
   const Rgb<double> amount = f * edges_.difference(edge, *point, vertex->q, way);
   if (is_black(amount) || !(density > 0)) return;
   BoundaryForm form = sweep(edge, *point, {way, distance}, share / density);
+  form.turn_at(vertex->q, form.x);
   form.x = vertex->q;
   form.distance = vertex->seen.distance;
   form.add_seen_point(scene, vertex->face, omega, form.of_ray());

@@ -70,15 +70,22 @@ BoundaryForm form_of(const Scene& scene, const PathVertex& vertex, const EdgeDra
                      const EdgeView& view) {
   const EdgeSample& sample = draw.sample;
   BoundaryForm form;
-  form.share = draw.share;
-  form.held = draw.held;
-  form.scale =
-      1 / (view.distance * view.distance * view.distance * sample.probability * sample.pdf_t);
+  form.held = draw.held && !draw.along;
+  form.scale = draw.share /
+               (view.distance * view.distance * view.distance * sample.probability * sample.pdf_t);
   form.add_edge(draw.mesh, sample.edge, sample.t, view.side);
   if (draw.along) {
-    form.x = vertex.surface.p;
+    const Vec3d p = vertex.surface.p;
+    if (vertex.bounces == 0 && !draw.held) form.turn_at(p, view.y);
+    form.x = p;
     form.distance = draw.along->distance;
     form.add_seen_point(scene, vertex.surface.face, draw.along->omega, -view.side);
+    if (const SeenVertex* viewer = draw.along->viewer) {
+      form.turn_at(viewer->q, p);
+      form.x = viewer->q;
+      form.distance = viewer->seen.distance;
+      form.add_seen_point(scene, viewer->face, viewer->seen.omega, form.of_ray());
+    }
   } else {
     form.x = view.y;
     form.distance = view.distance;

@@ -2,6 +2,7 @@
 // A vertex of a path as edge samplers see it, and what a point on an edge adds there.
 #include "integrators/terms/edge_difference.h"
 #include "integrators/terms/mirror_sight.h"
+#include "integrators/terms/seen_vertex.h"
 #include "integrators/terms/term.h"
 #include "limn/edgetree/edge_sampler.h"
 
@@ -20,6 +21,7 @@ void draw_edges(const EdgeSampler& sampler, const EdgeQuery& query, const Rng& k
 struct SeenAlong {
   Vec3d omega;  // unit, from the viewer
   double distance;
+  const SeenVertex* viewer = nullptr;  // of the camera, which is the sink's; null: the sink's own
 };
 
 // By way of which flat mirrors a vertex sees an edge, and where its image in them is.
@@ -32,10 +34,10 @@ struct MirrorWay {
 struct EdgeDraw {
   const EdgeMesh& mesh;
   const EdgeSample& sample;
-  RadiancePart part;  // of the radiance beyond the edge
-  Rng key;            // of the path and the sample
-  double share = 1;   // see BoundaryForm
-  bool held = false;
+  RadiancePart part;                 // of the radiance beyond the edge
+  Rng key;                           // of the path and the sample
+  double share = 1;                  // that counts: others draw the point, too
+  bool held = false;                 // the vertex sees the point in a direction that does not turn
   bool roulette = false;             // draws of little are left out by chance
   const SeenAlong* along = nullptr;  // null: the vertex is the sink's viewer
   const MirrorWay* way = nullptr;    // null: the vertex sees the edge itself

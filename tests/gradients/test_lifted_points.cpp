@@ -191,7 +191,7 @@ TEST(LiftedPoints, SeenPointsMoveAsSurfacesSay) {
     if (*std::min_element(b.begin(), b.end()) < 0) continue;  // beside the face
     form.add_seen_point(scene, face, omega, g);
     FilmSample sample{};
-    FilmLanes sink(scene, false, sample);
+    FilmLanes sink(scene, false, nullptr, sample);
     sink.at(at);
     ASSERT_TRUE(sink.takes(form, rng));
     sink.add(grey(1.0));

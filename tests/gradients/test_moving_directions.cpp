@@ -86,6 +86,40 @@ TEST(MovingDirections, KeepTheMeanOfSharpShadowsByAPilot) {
   expect_same_mean(make_scene(files, parts), {"leaf.translate.x", "leaf.rotate.z"}, {"adaptive"});
 }
 
+// A glossy plate just above a floor, under a lamp and a bulb: lines from edges and shadows find the
+// first vertices of paths, and have their share of what turns there change. Each seed is one turn.
+TEST(MovingDirections, KeepTheMeanOfLinesToFirstVertices) {
+  const TempFiles files;
+  SceneParts parts;
+  parts.max_depth = 3;
+  parts.origin = {0.3, 2, 3};
+  parts.target = {0, 0, 0};
+  parts.width = parts.height = 4;
+  Mesh plate = cube_mesh();
+  for (Vec3f& v : plate.positions) v = {v.x, 0.1f * v.y, 0.7f * v.z};
+  const std::string body = square("floor", 2.5, -90, {0, 0, 0}, diffuse("chalk", "0.8, 0.7, 0.6")) +
+                           obj_shape("plate", write_mesh(files, "plate.obj", plate), true, 0.6,
+                                     {0, 0.2, 0}, conductor("metal", 0.16));
+  for (const std::string& light :
+       {square("lamp", 0.1, 90, {-0.2, 2.7, -0.4}, area_light("glow", "60, 50, 40")),
+        std::string(R"(<emitter type="point" id="bulb"><point name="position" value="0.7,3,0.1"/>
+                       <rgb name="intensity" value="9,9,9"/></emitter>)")}) {
+    parts.body = body + light;
+    const Scene scene = make_scene(files, parts);
+    const auto estimate = [&](const std::string& method, int spp, uint64_t seed) {
+      return run_method(scene, {"plate.translate.y"}, method, spp, seed).parameters[0].image_sum;
+    };
+    const Moments held = estimate("silhouettes", 16384, 1);
+    std::vector<double> z;
+    for (uint64_t seed = 1; seed <= 8; ++seed) {
+      const Moments turned = estimate("silhouettes:directions=random:film=moving", 2048, seed);
+      z.push_back((turned.mean(0) - held.mean(0)) /
+                  std::sqrt(turned.variance(0) + held.variance(0)));
+    }
+    EXPECT_GE(summarize(z).p_largest, 1e-4) << summarize(z).largest;
+  }
+}
+
 // Seen at a grazing angle a floor that rises slides ten times as fast: its vertices take so many
 // directions in place of one.
 TEST(FastVertices, KeepTheMean) {

@@ -7,6 +7,7 @@
 #include "integrators/terms/penumbra_lines.h"
 #include "integrators/terms/term.h"
 #include "limn/core/image.h"
+#include "limn/integrators/statistics.h"
 #include "support/block_runs.h"
 #include "support/check_runs.h"
 #include "support/meshes.h"
@@ -350,8 +351,7 @@ TEST(Regions, SmallSharesStayWholeOnAverage) {
   for (int i = 0; i < 20000; ++i) {
     const auto drawn = lines.draw(rng.uniform(), rng, rays);
     if (!drawn) continue;
-    const EmitterWays ways{scene, input.edges(), *input.regions(), *edges};
-    const auto [density, share] = penumbra_share(ways, drawn->line, step, 0);
+    const auto [density, share, scattered] = penumbra_share(lines.ways(), drawn->line, step, 0);
     if (!(share > 0.005 && share < 0.1)) continue;
     DrawnLine line = *drawn;
     const bool goes_on = lines.complete(line, step, 0, rng);
@@ -362,6 +362,89 @@ TEST(Regions, SmallSharesStayWholeOnAverage) {
   fmt::print("{} lines, {:.3g} times their share\n", count, ratios.mean());
   EXPECT_GT(count, 200);
   EXPECT_LT(std::fabs(ratios.z_score(1)), 4);
+}
+
+// A thin plate just above a floor: what the floor beside its edge loses is light of the plate's own
+// lower side, from vertices so close to the edge that paths hardly meet them.
+Scene plate_scene(const TempFiles& files) {
+  SceneParts parts;
+  parts.max_depth = 3;
+  parts.origin = {0.3, 2, 3};
+  parts.target = {0, 0, 0};
+  parts.width = parts.height = 8;
+  Mesh plate = cube_mesh();
+  for (Vec3f& v : plate.positions) v = {v.x, 0.015f * v.y, 0.7f * v.z};
+  parts.body = square("floor", 2.5, -90, {0, 0, 0}, diffuse("chalk", "0.8, 0.7, 0.6")) +
+               obj_shape("plate", write_mesh(files, "plate.obj", plate), true, 0.6, {0, 0.0095, 0},
+                         conductor("metal", 0.16)) +
+               square("lamp", 0.14, 90, {-0.2, 2.7, -0.4}, area_light("glow", "60, 50, 40"));
+  return make_scene(files, parts);
+}
+
+TEST(Regions, PlatesBesideFloorsHaveTrueErrors) {
+  const TempFiles files;
+  const Scene scene = plate_scene(files);
+  constexpr int kRuns = 24;
+  std::vector<double> sums, variances;
+  RunningMean mean;
+  for (int seed = 1; seed <= kRuns; ++seed) {
+    const GradientResult result = run(scene, "silhouettes", {"plate.translate.z"}, 64, seed);
+    const Moments& sum = result.parameters[0].image_sum;
+    sums.push_back(sum.mean(0));
+    variances.push_back(sum.variance(0));
+    mean.add(sums.back());
+  }
+  double squares = 0;
+  for (int i = 0; i < kRuns; ++i) squares += std::pow(sums[i] - mean.mean(), 2) / variances[i];
+  fmt::print("mean {:.4g} +- {:.2g}: squares of {} z sum up to {:.3g}\n", mean.mean(),
+             mean.standard_error(), kRuns, squares);
+  EXPECT_GT(chi_square_p_value(squares, kRuns - 1), 1e-4);
+}
+
+// What lines are scattered to, each counted by one over its density on the film, adds up to the
+// film's area.
+TEST(Regions, ScatteredLinesFillTheFilm) {
+  const TempFiles files;
+  SceneParts parts;
+  parts.max_depth = 3;
+  parts.origin = {0, 6, 0.5};
+  parts.target = {0, 0, 0};
+  parts.fov = 14;
+  parts.width = 4;
+  parts.height = 3;
+  parts.body = square("floor", 3, -90, {0, 0, 0}, diffuse("chalk", "0.8, 0.7, 0.6")) +
+               square("wall", 0.3, 0, {0, 0.5, -1.2}, diffuse("clay", "0.5, 0.5, 0.5")) +
+               square("lamp", 0.1, 90, {5.2, 4, 0.3}, area_light("glow", "300, 300, 300"));
+  Scene scene = make_scene(files, parts);
+  find_parameter(scene, "wall.translate.x").seed(scene, 0);
+  const auto tracer = make_embree_tracer(scene, 1);
+  const Lights lights(scene);
+  const PathContext context{scene, *tracer, lights};
+  TermInput input(context, 1, {1, 1, 1, 1}, edge_sampler_type("silhouettes"), 1);
+  const EmitterEdges* edges = input.emitter_edges();
+  ASSERT_TRUE(edges);
+  const PenumbraLines lines(context, input.edges(), *input.regions(), *edges);
+  const Vec3d p{0.1, 0.45, -1.2};
+  Hit wall;
+  ASSERT_TRUE(tracer->closest({p + Vec3d{0, 0, 1}, {0, 0, -1}}, wall));
+  const DrawnLine drawn{{}, wall.face, {0, {}, {0, 1, 0}, p, {0, 0, 1}}};
+  Rng rng(43, 0, 0);
+  RayCount rays;
+  RunningMean area;
+  for (int i = 0; i < 1000000; ++i) {
+    const double u_0 = rng.uniform(), u_1 = rng.uniform();
+    const auto viewer = lines.scatter(drawn, u_0, u_1, {}, rays);
+    double added = 0;
+    if (viewer && viewer->seen.at.x >= 0 && viewer->seen.at.x < parts.width &&
+        viewer->seen.at.y >= 0 && viewer->seen.at.y < parts.height) {
+      const PathStep step{viewer->q, 1, viewer->face, value(scene.camera.origin)};
+      added = 1 / scattered_density(scene, drawn.line, step);
+    }
+    area.add(added);
+  }
+  fmt::print("area {:.5g} +- {:.2g} pixels\n", area.mean(), area.standard_error());
+  EXPECT_LT(area.standard_error(), 0.01 * area.mean());
+  EXPECT_LT(std::fabs(area.z_score(parts.width * parts.height)), 4);
 }
 
 }  // namespace
