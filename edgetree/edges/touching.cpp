@@ -22,6 +22,7 @@
 
 #include "edgetree/edges/contacts.h"
 #include "edgetree/edges/fold.h"
+#include "limn/core/check.h"
 
 namespace limn {
 namespace {
@@ -526,7 +527,7 @@ class Unifier {
       const Edge* edge;
       const Part* part;  // null: the edge is unchanged
     };
-    std::vector<Source> sources;
+    std::vector<Source> sources, changed;
     sources.reserve(old.edges.size() + parts.size());
     size_t next = 0;
     for (uint32_t e = 0; e < old.edges.size(); ++e) {
@@ -535,13 +536,19 @@ class Unifier {
         continue;
       }
       for (++next; next < parts.size() && parts[next].whole == EdgeId(e); ++next)
-        sources.push_back({&parts[next].edge, &parts[next]});
+        changed.push_back({&parts[next].edge, &parts[next]});
     }
-    const auto ends = [](const Source& s) {
-      return std::minmax(s.edge->vertices[0], s.edge->vertices[1]);
+    const auto before = [](const Source& a, const Source& b) {
+      const auto ends = [](const Source& s) {
+        return std::minmax(s.edge->vertices[0], s.edge->vertices[1]);
+      };
+      return ends(a) < ends(b);
     };
-    std::sort(sources.begin(), sources.end(),
-              [&](const Source& a, const Source& b) { return ends(a) < ends(b); });
+    std::stable_sort(changed.begin(), changed.end(), before);
+    // The edges of a mesh are sorted.
+    const auto middle = sources.insert(sources.end(), changed.begin(), changed.end());
+    DCHECK(std::is_sorted(sources.begin(), middle, before));
+    std::inplace_merge(sources.begin(), middle, sources.end(), before);
     mesh.edges.reserve(sources.size());
     mesh.face_offsets.reserve(sources.size() + 1);
     mesh.incident_faces.reserve(old.incident_faces.size());

@@ -4,8 +4,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <map>
 #include <set>
+#include <utility>
 
 #include "integrators/edges/texture_discontinuities.h"
 #include "limn/core/duplicate_faces.h"
@@ -32,14 +34,27 @@ std::vector<TouchingShape> touching_shapes(const Scene& scene) {
   return shapes;
 }
 
-// Duplicates cross others along one line: it is that of the first, also where they would part.
+// Duplicates cross others along one line: it is that of the first, also where they would part. As
+// they cross the same faces, they are among those that cross.
 void leave_out_duplicates(const Scene& scene, std::vector<IntersectionSegment>& segments) {
-  if (segments.empty()) return;
-  const DuplicateFaces duplicates(scene);
-  if (duplicates.empty()) return;
+  const auto corners_of = [&](FaceRef face) {
+    auto corners = face_corners<double>(scene.shape(face.shape).mesh, face.face);
+    std::array<std::array<double, 3>, 3> sorted;
+    for (int k = 0; k < 3; ++k) sorted[k] = {corners[k].x, corners[k].y, corners[k].z};
+    std::sort(sorted.begin(), sorted.end());
+    return sorted;
+  };
+  const auto place = [](FaceRef face) { return std::pair(face.shape, face.face); };
+  std::map<std::array<std::array<double, 3>, 3>, FaceRef> firsts;
+  for (const IntersectionSegment& segment : segments) {
+    for (const FaceRef face : segment.faces) {
+      FaceRef& first = firsts.emplace(corners_of(face), face).first->second;
+      if (place(face) < place(first)) first = face;
+    }
+  }
   std::erase_if(segments, [&](const IntersectionSegment& segment) {
-    return std::ranges::any_of(segment.faces,
-                               [&](FaceRef face) { return !(duplicates.first(face) == face); });
+    return std::ranges::any_of(
+        segment.faces, [&](FaceRef face) { return !(firsts.at(corners_of(face)) == face); });
   });
 }
 
