@@ -60,10 +60,11 @@ void leave_out_duplicates(const Scene& scene, std::vector<IntersectionSegment>& 
 
 bool is_black_behind(const Shape& shape) { return shape.bsdf->side(false) == nullptr; }
 
-// Whether all faces that a point sees the front of look alike from there, whatever their normals:
-// nothing is scattered, and what is emitted does not vary.
-bool ignores_normals(const Shape& shape) {
-  if (shape.is_emitter && shape.radiance_texture) return false;
+// Whether all faces that a point sees the front of look alike from there: nothing is scattered, and
+// what is emitted varies neither by place nor by vertex normals (SurfacePoint::emission).
+bool ignores_normals(const Scene& scene, const Shape& shape) {
+  const bool by_normals = scene.shading == ShadingModel::kMitsuba && !shape.mesh.normals.empty();
+  if (shape.is_emitter && (shape.radiance_texture || by_normals)) return false;
   for (const bool front : {true, false}) {
     const Bsdf* side = shape.bsdf->side(front);
     if (side && !(side->is_lambertian() && side->lobe().albedo == 0)) return false;
@@ -87,7 +88,7 @@ EdgeSamplerInput make_scene_edges(const Scene& scene, int threads) {
     const Shape& shape = scene.shapes[s];
     input.objects.push_back(build_edge_mesh(shape.mesh, is_black_behind(shape), ShapeId(s),
                                             textures.seams(ShapeId(s))));
-    if (ignores_normals(shape)) drop_folds(input.objects.back());
+    if (ignores_normals(scene, shape)) drop_folds(input.objects.back());
     meshes.push_back(&shape.mesh);
   }
   const Vec3d pinhole = value(scene.camera.origin);

@@ -16,13 +16,15 @@ struct Advice {
 
 const std::vector<Advice>& all_advice() {
   static const std::vector<Advice> all = {
-      {{"catmullrom", "lanczos", "mitchell"}, "limn has no negative weights: use gaussian"},
+      {{"catmullrom", "lanczos", "mitchell"},
+       "filters with negative weights are not supported: use gaussian"},
       {{"circular", "measured_polarized", "polarizer", "retarder", "stokes"},
        "limn has no polarisation"},
       {{"constvolume", "gridvolume", "heterogeneous", "homogeneous", "medium", "volume"},
        "limn has no volumes"},
       {{"depth"}, "use path and render --what depth"},
-      {{"directionalarea"}, "a directional emitter through a hole of its shape casts this beam"},
+      {{"directionalarea"},
+       "use a directional emitter, and a screen with a hole of the shape's outline"},
       {{"merge"}, "put its shapes directly under <scene>"},
       {{"pplastic"}, "limn has no polarisation: roughplastic is similar"},
       {{"sdfgrid"}, "limn has no signed distances: extract a mesh"},

@@ -170,6 +170,7 @@ Parameter find_parameter_or_array(const Scene& scene, const std::string& name) {
   constexpr std::string_view kOneValue = ".value";
   if (name.ends_with(kOneValue)) {
     const std::string stem = name.substr(0, name.size() - kOneValue.size());
+    if (stem.ends_with(kOneValue)) fail_unknown(scene, name, list_parameters(scene));
     Parameter found = find_parameter_or_array(scene, stem);
     found.name = name;  // results are looked up by the name that was given
     return found;

@@ -1,6 +1,7 @@
 // How the camera's edges are chosen: by how much radiance differs across them, too.
 #include <gtest/gtest.h>
 
+#include "integrators/edges/scene_edges.h"
 #include "integrators/paths/traced_scene.h"
 #include "integrators/terms/camera_edges.h"
 #include "integrators/terms/term.h"
@@ -106,6 +107,27 @@ TEST(CameraEdges, OfBlackShapesHaveNoFolds) {
     EXPECT_EQ(share.sharp, 0u);
     EXPECT_NEAR(share.points, 1, 1e-12);
   }
+}
+
+// Two halves of a plane whose normals differ: with Mitsuba's shading one of them shines towards a
+// point that sees the other dark.
+TEST(CameraEdges, OfEmittersFollowNormalsWithMitsubasShading) {
+  const TempFiles files;
+  SceneParts parts;
+  const std::string halves = files.write("halves.obj",
+                                         "v -1 -1 0\nv 0 -1 0\nv 0 1 0\nv -1 1 0\nv 1 -1 0\n"
+                                         "v 1 1 0\nvn 0 0 1\nvn -0.866 0 0.5\n"
+                                         "f 1//1 2//1 3//1\nf 1//1 3//1 4//1\n"
+                                         "f 2//2 5//2 6//2\nf 2//2 6//2 3//2\n");
+  parts.body = obj_shape("lamp", halves, false, 1, {0, 0, 0},
+                         diffuse("soot", "0, 0, 0") + area_light("glow", "5, 4, 3"));
+  Scene scene = make_scene(files, parts);
+  const auto sharp_edges = [&] {
+    return make_scene_edges(scene, 1).objects[0].count(EdgeClass::kSharp);
+  };
+  EXPECT_EQ(sharp_edges(), 0u);
+  scene.shading = ShadingModel::kMitsuba;
+  EXPECT_EQ(sharp_edges(), 1u);
 }
 
 }  // namespace

@@ -86,6 +86,11 @@ def test_transforms_move_points():
     np.testing.assert_allclose(pose.matrix, eye.sensor_to_world, atol=1e-12)
     with pytest.raises(limn.InputError, match=r"points have shape \(3,\) or \(N, 3\), not \(2,\)"):
         steps @ [1, 2]
+    for step, wrong in [(t.rotate([0, 0, 0], 40), "rotate: the axis is zero"),
+                        (t.look_at([1, 2, 3], [1, 2, 3], up=[0, 1, 0]), "origin and target"),
+                        (t.look_at([0, 0, 5], [0, 0, 0], up=[0, 0, 2]), "up lies along")]:
+        with pytest.raises(limn.InputError, match=wrong):
+            step.matrix  # noqa: B018
 
 
 @pytest.mark.parametrize("change, text", [

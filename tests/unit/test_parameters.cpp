@@ -316,6 +316,7 @@ TEST_F(Parameters, WhatHasNoIdIsNamedByItsFileOrType) {
   };
   EXPECT_EQ(red("cube.bsdf.reflectance"), 0.5);
   EXPECT_EQ(red("cube_2.bsdf.reflectance.value"), 0.25);
+  EXPECT_THROW(red("cube_2.bsdf.reflectance.value.value"), InputError);
   EXPECT_EQ(red("disk.emitter.radiance"), 3);
   EXPECT_EQ(scene.bsdfs_by_id.at("cube_1"), scene.shapes[3].bsdf);
   EXPECT_FALSE(scene.bsdfs_by_id.contains("cube_3.bsdf"));

@@ -298,8 +298,7 @@ void CompareCommand::add_options(CLI::App& app) {
       ->excludes(wrt);
   const OptionAdder add(app);
   command_.render.generator = kGenerators[0];
-  visit_options(command_.render,
-                all_but({"method", "generator", "film", "points", "sigma", "gamma"}, add));
+  visit_options(command_.render, all_but({"method", "generator", "points", "sigma", "gamma"}, add));
   app.add_option("--methods", command_.methods,
                  "Methods to compare; ratios are relative to the first: " +
                      limn::join(method_names(Task::kGradient)) + ", " + kMitsuba + ", " +

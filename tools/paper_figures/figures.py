@@ -45,13 +45,12 @@ def bias(name, method, *options):
 FIGURES = [
     Figure(
         "Figures 7 and 8",
-        "What a node's test rejects, and what one point reaches",
+        "What a node's test rejects",
         "For a spherical and a toroidal patch, two slices of space each: where a box around the "
         "planes rejects, where box and quadrics do, Li 2019, and Li 2019 with the mistake of redner "
-        "(a solid sphere in place of a hollow one). Quadrics gain most on the torus. For one shading "
-        "point, the edges with a probability: far fewer than with Li 2019.",
+        "(a solid sphere in place of a hollow one). Quadrics gain most on the torus.",
         "Orange: false positives. A node of the paper's forest and the nearest one of each other "
-        "tree; the edge pictures are of one point of the whole mesh.",
+        "tree.",
         [patch("fig7-sphere", "sphere 8192"), patch("fig7-torus", "torus 8192"),
          Part("fig8-creature", "reject", "", methods=BOXES, small_mesh="creature 8000")],
     ),

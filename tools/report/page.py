@@ -54,7 +54,7 @@ READING = {
         ("Slices",
          "A rejection test says of a point in space whether a group of edges may hold a silhouette"
          " as seen from there. Grey: true negative. Blue: true positive. Orange: false positive,"
-         " which costs time and samples. Red: a silhouette lost; there must be none."),
+         " which costs time and samples. Magenta: a silhouette lost; there must be none."),
         ("Reachable edges",
          "Edges that a descent from a shading point can end on. Those that are no silhouettes are"
          " wasted."),

@@ -23,26 +23,32 @@ void visit_options(Like<BackwardOptions> auto& o, auto&& visit, Task task = Task
             .with(&Option::flag, "uniform_pixels")
             .samples());
   visit(o.points, kPointsOption);
-  visit(
-      o.edge_samples,
-      Option{"edge_samples",
-             "Boundary samples per path vertex (other than the default: no pilot chooses numbers)",
-             1, 1 << 16}
-          .samples());
+  const bool fit = task == Task::kFit;  // its steps have no pilot
+  visit(o.edge_samples,
+        Option{"edge_samples",
+               fit ? "Boundary samples per path vertex"
+                   : "Boundary samples per path vertex. A number other than the default turns the "
+                     "pilot off",
+               1, 1 << 16}
+            .samples());
   visit(o.camera_samples,
         Option{"camera_samples",
-               "Boundary samples on the film per path (term camera; given, no pilot chooses "
-               "numbers)",
+               fit ? "Boundary samples on the film per path (term camera)"
+                   : "Boundary samples on the film per path (term camera). A number turns the "
+                     "pilot off",
                1e-6L, 1 << 16}
-            .or_zero("a pilot's choice; without one 0.25, 1 with the method analytic")
+            .or_zero(fit ? "0.25, 1 with the method analytic"
+                         : "a pilot's choice; without one 0.25, 1 with the method analytic")
             .samples());
   visit(o.shadow_samples,
         Option{"shadow_samples",
-               "Boundary samples on the edges of visible shadows per path (terms shadow and "
-               "penumbra; other than the default: no pilot chooses numbers)",
+               fit ? "Boundary samples on the edges of visible shadows per path (terms shadow and "
+                     "penumbra)"
+                   : "Boundary samples on the edges of visible shadows per path (terms shadow and "
+                     "penumbra). A number other than the default turns the pilot off",
                1e-6L, 1 << 16}
             .samples());
-  if (task == Task::kFit) return;
+  if (fit) return;
   visit(o.batches, Option{"batches",
                           "Most batches, from which standard errors come; each takes some time per "
                           "vertex",

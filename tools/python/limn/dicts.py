@@ -86,6 +86,13 @@ def _pixels(image: Any, raw: bool) -> npt.NDArray[Any]:
     return linear.astype(np.float32)
 
 
+def _unit(v: npt.NDArray[np.float64], wrong: str) -> npt.NDArray[np.float64]:
+    length = np.linalg.norm(v)
+    if length == 0:
+        raise InputError(wrong)
+    return v / length
+
+
 def _step_matrix(tag: str, attributes: Mapping[str, str]) -> npt.NDArray[np.float64]:
     """(4, 4) of one step of a Transform, as the reader of files makes it."""
     values = {k: np.array(v.split(), dtype=float) for k, v in attributes.items()}
@@ -98,15 +105,13 @@ def _step_matrix(tag: str, attributes: Mapping[str, str]) -> npt.NDArray[np.floa
     elif tag == "scale":
         made[:3, :3] = np.diag(np.broadcast_to(values["value"], 3))
     elif tag == "rotate":
-        x, y, z = axis = values["value"] / np.linalg.norm(values["value"])
+        x, y, z = axis = _unit(values["value"], "rotate: the axis is zero")
         turn, cross = np.radians(values["angle"][0]), np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
         made[:3, :3] = (np.cos(turn) * np.eye(3) + np.sin(turn) * cross
                         + (1 - np.cos(turn)) * np.outer(axis, axis))  # fmt: skip
     else:  # lookat
-        ahead = values["target"] - values["origin"]
-        ahead /= np.linalg.norm(ahead)
-        left = np.cross(values["up"], ahead)
-        left /= np.linalg.norm(left)
+        ahead = _unit(values["target"] - values["origin"], "look_at: origin and target are equal")
+        left = _unit(np.cross(values["up"], ahead), "look_at: up lies along the view")
         made[:3] = np.column_stack([left, np.cross(ahead, left), ahead, values["origin"]])
     return made
 
