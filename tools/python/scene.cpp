@@ -289,7 +289,8 @@ nb::class_<SceneHandle> bind_scene(nb::module_& m) {
         "smooth_as: the roughness (GGX) that smooth conductors, dielectrics and plastics get, so "
         "that derivatives have all edges (0.003), plastics a few percent darker; 0: they stay "
         "smooth. Raises limn.InputError with file, line and column.");
-  m.def("_advice_on", advice_on);
+  m.def("advice_on", advice_on, nb::arg("type"),
+        "\"; \" and what to write in place of a type of Mitsuba's that limn lacks, or \"\".");
   m.def("load_string", load_string, nb::arg("xml"), nb::arg("folder") = "",
         nb::arg("substitutions"),
         nb::sig("def load_string(xml: str, folder: str | os.PathLike[str] = '', **substitutions: "

@@ -14,7 +14,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 import numpy.typing as npt
 
-from ._limn import Scene, _advice_on, load_string, write_exr
+from ._limn import Scene, advice_on, load_string, write_exr
 from .errors import InputError
 from .meshes import read_foreign, write_ply
 
@@ -226,7 +226,7 @@ class _Writer:
             known = ", ".join(sorted([*_TAGS, "mesh", "ref", "rgb"]))
             hint = '; "mesh" reads STL, glTF, ...' if "filename" in what else ""
             raise InputError(f'{place}: error: unknown type "{kind}" (known: {known}{hint})'
-                             + _advice_on(kind))
+                             + advice_on(kind))
         tag = _TAGS[kind]
         attributes = {"type": kind}
         if tag in ("spectrum", "texture"):
