@@ -30,6 +30,7 @@ std::optional<ForestGroup> group_of(const EdgeMesh& mesh, const Edge& edge, bool
       if (cull_concave && edge.concave && mesh.one_sided_closed) return std::nullopt;
       return ForestGroup::kSilhouette;
     case EdgeClass::kSharp:
+      return mesh.one_sided_closed ? ForestGroup::kFront : ForestGroup::kFolds;
     case EdgeClass::kTexture:
       return mesh.one_sided_closed ? ForestGroup::kFront : ForestGroup::kAlways;
     default:
@@ -48,6 +49,10 @@ Wedge wedge_of(const EdgeMesh& mesh, EdgeId id) {
   const Vec3d &n0 = wedge.planes[0].n, &n1 = wedge.planes[1].n;
   wedge.angle = std::atan2(length(cross(n0, n1)), dot(n0, n1));
   wedge.edge = id;
+  if (edge.edge_class == EdgeClass::kSharp && std::isfinite(mesh.fold_contrast)) {
+    wedge.fold =
+        std::clamp(2 * std::tan(0.5 * wedge.angle) * mesh.fold_contrast, double{kLeastFold}, 1.0);
+  }
   return wedge;
 }
 
@@ -79,6 +84,12 @@ double length_of(std::span<const Wedge> wedges) {
 
 float positive(double x) {
   return static_cast<float>(std::max(x, double{std::numeric_limits<float>::min()}));
+}
+
+double folds_of(std::span<const Wedge> wedges) {
+  double sum = 0;
+  for (const Wedge& wedge : wedges) sum += wedge.length * wedge.fold;
+  return sum;
 }
 
 // Nonzero motion must not underflow.
@@ -116,6 +127,7 @@ struct TreeKind {
   ShapeId object;
   uint32_t motion;
   ForestGroup group;
+  float fold = 1;  // see NodeHead
 };
 
 // Fills the nodes of one tree independently. ids: of the tree's nodes in the forest. below: the
@@ -152,15 +164,17 @@ class TreeFiller {
     head.object = kind_.object;
     head.motion = kind_.motion;
     head.group = kind_.group;
+    head.fold = kind_.fold;
   }
 
   DualFit fit(std::span<const Wedge> wedges, const NodeFrame& frame) const {
+    if (kind_.group == ForestGroup::kAlways) return unrejectable_fit(length_of(wedges));
     if (kind_.group == ForestGroup::kSilhouette) return fit_dual(wedges, frame, config_);
-    const double length = length_of(wedges);
-    if (kind_.group == ForestGroup::kAlways) return unrejectable_fit(length);
-    DualFit fit = fit_dual(wedges, frame, config_);
-    fit.cover[0] = length;
-    return fit;
+    // What silhouettes count beyond folds.
+    static thread_local std::vector<Wedge> rest;
+    rest.assign(wedges.begin(), wedges.end());
+    for (Wedge& wedge : rest) wedge.length *= 1 - wedge.fold;
+    return fit_dual(rest, frame, config_);
   }
 
   void fill_children(const SplitNode<kWidth>& split, const NodeFrame& frame,
@@ -173,6 +187,7 @@ class TreeFiller {
       if (wedges.empty()) continue;
       put_rows(dual, lane, node.rows);
       for (int k = 0; k < 3; ++k) node.cover[k][lane] = positive(dual.cover[k] * scale);
+      node.folds[lane] = positive(folds_of(wedges) * scale);
       node.speed[lane] = speed_of(wedges);
       node.child[lane] =
           split.has_edges ? below_[split.ranges[lane].begin] : ids_[split.children[lane]];
@@ -308,7 +323,9 @@ double expected_length(const Wedge& wedge, ForestGroup group) {
     case ForestGroup::kSilhouette:
       return wedge.length * wedge.angle / kPi;
     case ForestGroup::kFront:
-      return wedge.length * (0.5 + 0.5 * wedge.angle / kPi);
+      return wedge.length * (0.5 * wedge.fold + 0.5 * wedge.angle / kPi);
+    case ForestGroup::kFolds:
+      return wedge.length * std::max(wedge.fold, wedge.angle / kPi);
     default:
       return wedge.length;
   }
@@ -405,7 +422,7 @@ Forest build_forest(const EdgeSamplerInput& input, int threads, const ForestConf
   for_every_tree(input, config.cull_concave, forest,
                  [&](auto& wedges, ShapeId object, ForestGroup group) {
                    const EdgeMesh& mesh = input.object(object);
-                   const TreeKind kind{object, motions[object.index()], group};
+                   const TreeKind kind{object, motions[object.index()], group, mesh.fold_contrast};
                    const ObjectMotion motion = forest.motions[kind.motion];
                    set_speeds(mesh, input.lane_scale, motion, wedges);
                    const Wedge whole = stand_in(wedges, group, motion);

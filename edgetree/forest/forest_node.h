@@ -16,9 +16,17 @@ namespace limn {
 enum class ForestGroup : uint8_t {
   kSilhouette,  // smooth and flat: candidates if p is between their planes
   kFront,       // sharp, of closed one-sided meshes: candidates if p is in front of a face
-  kAlways,      // boundary, irregular, and other sharp edges: always candidates
+  kFolds,       // other sharp edges between two faces: always candidates
+  kAlways,      // boundary, irregular and other edges: always candidates
 };
-inline constexpr int kForestGroups = 3;
+inline constexpr int kForestGroups = 4;
+// Whether its edges may be silhouettes or folds, both faces of which p sees.
+constexpr bool has_folds(ForestGroup group) {
+  return group == ForestGroup::kFront || group == ForestGroup::kFolds;
+}
+constexpr bool rejects_none(ForestGroup group) {
+  return group == ForestGroup::kFolds || group == ForestGroup::kAlways;
+}
 
 // A node: >= 0 is the index of an inner node, < 0 is ~index of an edge node.
 using NodeId = int32_t;
@@ -37,7 +45,12 @@ struct NodeHead {
   uint32_t motion;  // index in Forest::motions
   ForestGroup group;
   uint8_t height;  // 0 for edge nodes, else 1 + the largest height of a child
+  float fold;      // EdgeMesh::fold_contrast, of edge nodes
 };
+
+// What a fold counts beside a silhouette, by the tangent of half its dihedral angle: at least a
+// share that is not tuned.
+inline constexpr float kLeastFold = 1 / 64.0f;
 
 // Dual boxes (README.md): planes of a child that pass through p satisfy row_0 . x + sum over k of
 // u_k (row_k . x) = 0 for some u in [-1, 1]^3. Row lengths sum to 1.
@@ -53,6 +66,9 @@ struct alignas(64) InnerNode {
   // Bounding boxes of the children: the frame's cube [-1, 1]^3 is kBoxSteps wide; bits 0 to 9 hold
   // x, then y, then z.
   Ints low, high;
+  // Where the group has folds: the sum over edges of length * inverse_radius^2 times what each
+  // counts as a fold.
+  Floats folds;
   uint8_t ahead;  // one bit per child: weighted by its own children, see ForestConfig
 };
 

@@ -86,8 +86,10 @@ DualSegment dual_segment(const EdgeNode& node, const FramePoint& at) {
   return {row_product(node.rows[0], at), abs(row_product(node.rows[1], at)) + at.error};
 }
 
+Ints between_planes(Floats middle, Floats half) { return abs(middle) <= half; }
+
 Ints not_rejected(ForestGroup group, Floats middle, Floats half) {
-  if (group == ForestGroup::kSilhouette) return abs(middle) <= half;
+  if (group == ForestGroup::kSilhouette) return between_planes(middle, half);
   if (group == ForestGroup::kFront) return middle + half >= 0;
   return Ints{} - 1;
 }
@@ -113,21 +115,37 @@ Floats expected_length(const InnerNode& node, const DualPlane& plane, float erro
 Floats length_of(const InnerNode& node, const FramePoint& at, const DualPlane& plane, bool soft) {
   const ForestGroup group = node.head.group;
   if (group == ForestGroup::kAlways) return node.cover[0];
-  Floats length = node.cover[0];
-  if (group == ForestGroup::kSilhouette) {
-    length = expected_length(node, plane, at.error, soft);
-  } else if (soft) {
-    length *= clamp(0.5f + 0.5f * plane.g[0] / plane.half, splat(kShallow), splat(1.0f));
+  const Floats length = select(between_planes(plane.g[0], plane.half),
+                               expected_length(node, plane, at.error, soft), splat(0.0f));
+  if (group == ForestGroup::kSilhouette) return length;
+  Floats folds = node.folds;
+  if (soft && group == ForestGroup::kFront)
+    folds *= clamp(0.5f + 0.5f * plane.g[0] / plane.half, splat(kShallow), splat(1.0f));
+  return select(not_rejected(group, plane.g[0], plane.half), length + folds, splat(0.0f));
+}
+
+// What edges count beside silhouettes: folds less. Zero for rejected ones.
+Floats share_of(const EdgeNode& node, const FramePoint& at) {
+  const ForestGroup group = node.head.group;
+  if (group == ForestGroup::kAlways) return splat(1.0f);
+  const DualSegment segment = dual_segment(node, at);
+  const Ints alive = not_rejected(group, segment.middle, segment.half);
+  Floats share = splat(1.0f);
+  if (has_folds(group) && node.head.fold < std::numeric_limits<float>::infinity()) {
+    // The rows are in proportion to the sum and the difference of the faces' planes.
+    const auto square = [&](int i) {
+      const Floats* row = node.rows[i];
+      return row[0] * row[0] + row[1] * row[1] + row[2] * row[2];
+    };
+    const Floats tangent2 = square(1) / max(square(0), splat(kLeast));
+    const Floats fold = clamp(2 * node.head.fold * sqrt(tangent2), splat(kLeastFold), splat(1.0f));
+    share = select(between_planes(segment.middle, segment.half), share, fold);
   }
-  Ints alive = not_rejected(group, plane.g[0], plane.half);
-  return select(alive, length, splat(0.0f));
+  return select(alive, share, splat(0.0f));
 }
 
 Floats length_of(const EdgeNode& node, const FramePoint& at) {
-  if (node.head.group == ForestGroup::kAlways) return node.length;
-  const DualSegment segment = dual_segment(node, at);
-  return select(not_rejected(node.head.group, segment.middle, segment.half), node.length,
-                splat(0.0f));
+  return node.length * share_of(node, at);
 }
 
 // Radiance that may arrive from behind the boxes: lights and environment.
@@ -381,7 +399,7 @@ Ints may_hold_candidates(const EdgeNode& node, const ForestPoint& point) {
 }
 
 bool surely_candidate(const EdgeNode& node, int lane, const ForestPoint& point) {
-  if (node.head.group == ForestGroup::kAlways) return true;
+  if (rejects_none(node.head.group)) return true;
   const FramePoint at = to_frame(node.head, point);
   const DualSegment segment = dual_segment(node, at);
   // Removes twice the error from `half`, which was enlarged by it once.
@@ -497,7 +515,8 @@ Floats weigh_edges(const EdgeNode& node, const ForestQuery& query) {
   const Floats tangent =
       select(cosine > 0, sine / (1 + cosine), (1 - cosine) / max(sine, splat(1e-6f)));
 
-  Ints alive = length_of(node, at) > 0;
+  const Floats share = share_of(node, at);
+  Ints alive = (node.length > 0) & (share > 0);
   if (query.point.may_be_vertex) alive &= ~ends_at(node, query.point.p);
   // Rounding of w and of the product with n.
   const Floats slack = 8 * 0x1.0p-24f * (l_0 + l_1);
@@ -509,7 +528,7 @@ Floats weigh_edges(const EdgeNode& node, const ForestQuery& query) {
   alive &= speed > 0;
   const Floats lobe = query.lobe.mean_over_segments(d, along * splat(0.5f));
   if (query.own_plane) alive &= ~own_edges(node, query, w_0, w_1, alive);
-  const Floats weight = speed * query.unit * tangent * (l_0 + l_1) / product *
+  const Floats weight = share * speed * query.unit * tangent * (l_0 + l_1) / product *
                         light_through(query, lobe, d, half, distance2, alive);
   return select(alive, clamp(weight, splat(kLeast), splat(kMost)), splat(0.0f));
 }

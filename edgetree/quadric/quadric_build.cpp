@@ -127,7 +127,7 @@ class Filler {
 
   QuadricFit fit(std::span<const Wedge> wedges, const NodeFrame& frame,
                  const Summary& child) const {
-    if (group_ == ForestGroup::kAlways) return unrejectable_quadric_fit();
+    if (rejects_none(group_)) return unrejectable_quadric_fit();
     return fit_quadrics(wedges, frame, quadrics_ ? &child.moments : nullptr, child.frame);
   }
 

@@ -89,7 +89,7 @@ Longs may_hold_candidates(const QuadricForest& forest, NodeId id, const QuadricP
   const QuadricNode& node = forest.nodes[id];
   Longs alive;
   for (int lane = 0; lane < kQuadricWidth; ++lane) alive[lane] = -(node.child[lane] != kNoChild);
-  if (node.group == ForestGroup::kAlways) return alive;
+  if (rejects_none(node.group)) return alive;
   const QueryPlanes planes = planes_of(node, FramePoint(node, point.p), point.slack);
   if (node.group == ForestGroup::kFront) {
     const Doubles reach = abs(planes.g[1]) + abs(planes.g[2]) + abs(planes.g[3]) + planes.error;

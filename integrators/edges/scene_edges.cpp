@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
 #include <map>
 #include <set>
 #include <utility>
@@ -72,6 +73,23 @@ bool ignores_normals(const Scene& scene, const Shape& shape) {
   return true;
 }
 
+// EdgeMesh::fold_contrast. Light that is scattered changes with the normal as the lobe does; where
+// normals are not the faces', or textures may differ too, nothing is known.
+float fold_contrast(const Shape& shape) {
+  constexpr float kUnknown = std::numeric_limits<float>::infinity();
+  if (shape.mesh.normal_source != NormalSource::kFace || shape.mesh.textured) return kUnknown;
+  double most = 0;
+  for (const bool front : {true, false}) {
+    const Bsdf* side = shape.bsdf->side(front);
+    if (!side) continue;
+    const LobeSummary lobe = side->lobe();
+    const bool summary = side->is_lambertian() || lobe.model != &kHemisphere;
+    if (!summary || side->lobes().smooth || side->lobes().through) return kUnknown;
+    most = std::max(most, lobe.albedo / lobe.model->width(lobe));
+  }
+  return static_cast<float>(most);
+}
+
 // Of such a shape two faces differ only where one of them is seen from behind.
 void drop_folds(EdgeMesh& mesh) {
   for (Edge& edge : mesh.edges)
@@ -88,6 +106,7 @@ EdgeSamplerInput make_scene_edges(const Scene& scene, int threads) {
     const Shape& shape = scene.shapes[s];
     input.objects.push_back(build_edge_mesh(shape.mesh, is_black_behind(shape), ShapeId(s),
                                             textures.seams(ShapeId(s))));
+    input.objects.back().fold_contrast = fold_contrast(shape);
     if (ignores_normals(scene, shape)) drop_folds(input.objects.back());
     meshes.push_back(&shape.mesh);
   }

@@ -100,14 +100,17 @@ EdgeQuery random_query(Rng& rng) {
   return q;
 }
 
-// Two moving objects side by side.
+// Two moving objects side by side; of the second folds differ less.
 EdgeSamplerInput test_input(const Mesh& mesh) {
   Vec3d identity[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   Mesh first = mesh, second = transformed(mesh, identity, 0.5, {1.2, 0.1, -0.4});
   set_test_tangents(first);
   set_test_tangents(second);
-  return {.objects = {build_edge_mesh(first, true), build_edge_mesh(second, true, ShapeId(1))},
-          .environment_luminance = 1};
+  EdgeSamplerInput input{
+      .objects = {build_edge_mesh(first, true), build_edge_mesh(second, true, ShapeId(1))},
+      .environment_luminance = 1};
+  input.objects[1].fold_contrast = 0.3f;
+  return input;
 }
 
 // Small objects around the origin, a fifth of which move, over a large one.

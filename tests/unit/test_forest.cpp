@@ -437,6 +437,40 @@ TEST(Forest, SeesHowEdgesMove) {
   }
 }
 
+// The share of draws that are outlines, of a flat-shaded ball.
+double share_of_outlines(bool black_behind, float contrast) {
+  Mesh mesh = icosphere_mesh(3);
+  set_test_tangents(mesh);
+  EdgeSamplerInput input{.objects = {build_edge_mesh(mesh, black_behind)},
+                         .environment_luminance = 1};
+  EdgeMesh& ball = input.objects[0];
+  ball.fold_contrast = contrast;
+  const auto forest = EdgeForest::build(input, 1, {});
+  EdgeQuery query;
+  query.p = {0.3, -0.2, 3};
+  query.n = query.wi = -normalize(query.p);
+  double outlines = 0, all = 0;
+  for (uint32_t e = 0; e < ball.edges.size(); ++e) {
+    const double probability = forest->probability(query, {ShapeId(0), EdgeId(e)});
+    all += probability;
+    if (is_outline(ball, EdgeId(e), query.p)) outlines += probability;
+    // Folds stay possible.
+    if (is_candidate(ball, EdgeId(e), query.p)) {
+      EXPECT_GT(probability, 0);
+    }
+  }
+  return outlines / all;
+}
+
+TEST(Forest, DrawsFoldsByHowMuchTheyDiffer) {
+  for (const bool black_behind : {true, false}) {
+    EXPECT_LT(share_of_outlines(black_behind, std::numeric_limits<float>::infinity()), 0.2);
+    const double share = share_of_outlines(black_behind, 0.1f);
+    EXPECT_GT(share, 0.5);
+    EXPECT_LT(share, 0.95);
+  }
+}
+
 // What no map holds is in the nodes of edges, whatever share it is.
 TEST(Forest, KeepsMotionThatIsNotLinear) {
   Rng rng(28, 0, 0);

@@ -3,6 +3,7 @@
 // from a point p may be discontinuous.
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <string>
 #include <vector>
@@ -91,6 +92,9 @@ struct EdgeMesh {
   // positive volume (false for inverted components and for cavities). Self-intersections are not
   // tested. Of the edges of a texture: true if faces are black from behind.
   bool one_sided_closed = false;
+  // Importance alone: by how much radiance differs across a sharp edge both of whose faces are
+  // seen, per radian between their normals, over that across a silhouette; at most 1 counts.
+  float fold_contrast = std::numeric_limits<float>::infinity();
   double extent = 0;  // largest |x| of a position in use
 
   bool of_texture() const { return !places.empty(); }
