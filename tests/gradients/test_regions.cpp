@@ -131,8 +131,26 @@ TEST(Regions, AGlowIsOne) {
   const std::vector<std::string> parameters = {"body.translate.x", "floor.rotate.x",
                                                "body.rotate.z", "body.scale"};
   const GradientResult a = run(scene, "silhouettes", parameters, 256, 1);
-  const GradientResult b = run(scene, "forest", parameters, 1024, 2);
-  for (size_t k = 0; k < parameters.size(); ++k) expect_equal(a.parameters[k], b.parameters[k]);
+  // `forest` meets the sun by rare draws that its own errors miss: they come from its seeds.
+  constexpr int kSeeds = 32;
+  constexpr double kLargest = 4.4;  // of Student's t with 31 degrees: |t| beyond with 1e-4
+  std::vector<double> sums(parameters.size()), squares(parameters.size());
+  for (int seed = 2; seed < 2 + kSeeds; ++seed) {
+    const GradientResult b = run(scene, "forest", parameters, 64, seed);
+    for (size_t k = 0; k < parameters.size(); ++k) {
+      const double sum = b.parameters[k].image_sum.mean(0);
+      sums[k] += sum;
+      squares[k] += sum * sum;
+    }
+  }
+  for (size_t k = 0; k < parameters.size(); ++k) {
+    const Moments& image = a.parameters[k].image_sum;
+    const double mean = sums[k] / kSeeds;
+    const double variance = (squares[k] / kSeeds - mean * mean) / (kSeeds - 1);
+    const double t = (image.mean(0) - mean) / std::sqrt(variance + image.variance(0));
+    EXPECT_LT(std::fabs(t), kLargest) << fmt::format("{}: {} and {} +- {}", parameters[k],
+                                                     image.mean(0), mean, std::sqrt(variance));
+  }
 }
 
 // The object before the sun, and a lamp beside it.
