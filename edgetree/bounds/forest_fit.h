@@ -16,7 +16,7 @@ struct Wedge {
   double length = 0;
   double angle = 0;  // exterior dihedral angle
   double speed = 0;  // residual of ObjectMotion: mean of both ends, sum over lanes
-  double fold = 1;   // what the edge counts where p sees both faces, beside a silhouette
+  double fold = 1;   // weight where p sees both faces, over that as a silhouette
   EdgeId edge;
 };
 

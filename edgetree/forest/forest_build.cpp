@@ -170,7 +170,7 @@ class TreeFiller {
   DualFit fit(std::span<const Wedge> wedges, const NodeFrame& frame) const {
     if (kind_.group == ForestGroup::kAlways) return unrejectable_fit(length_of(wedges));
     if (kind_.group == ForestGroup::kSilhouette) return fit_dual(wedges, frame, config_);
-    // What silhouettes count beyond folds.
+    // A fold counts `folds` of the node; a silhouette counts this much more.
     static thread_local std::vector<Wedge> rest;
     rest.assign(wedges.begin(), wedges.end());
     for (Wedge& wedge : rest) wedge.length *= 1 - wedge.fold;

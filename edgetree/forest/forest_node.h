@@ -20,7 +20,7 @@ enum class ForestGroup : uint8_t {
   kAlways,      // boundary, irregular and other edges: always candidates
 };
 inline constexpr int kForestGroups = 4;
-// Whether its edges may be silhouettes or folds, both faces of which p sees.
+// Whether its edges may be folds: p sees both of their faces. Other candidates are silhouettes.
 constexpr bool has_folds(ForestGroup group) {
   return group == ForestGroup::kFront || group == ForestGroup::kFolds;
 }
@@ -48,8 +48,8 @@ struct NodeHead {
   float fold;      // EdgeMesh::fold_contrast, of edge nodes
 };
 
-// What a fold counts beside a silhouette, by the tangent of half its dihedral angle: at least a
-// share that is not tuned.
+// The least weight of a fold over that of a silhouette: every fold stays possible. Not tuned. Above
+// it the weight is EdgeMesh::fold_contrast times twice the tangent of half the dihedral angle.
 inline constexpr float kLeastFold = 1 / 64.0f;
 
 // Dual boxes (README.md): planes of a child that pass through p satisfy row_0 . x + sum over k of

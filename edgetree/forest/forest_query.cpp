@@ -124,7 +124,7 @@ Floats length_of(const InnerNode& node, const FramePoint& at, const DualPlane& p
   return select(not_rejected(group, plane.g[0], plane.half), length + folds, splat(0.0f));
 }
 
-// What edges count beside silhouettes: folds less. Zero for rejected ones.
+// The weight of each edge over that of a silhouette: less for folds, 0 for rejected edges.
 Floats share_of(const EdgeNode& node, const FramePoint& at) {
   const ForestGroup group = node.head.group;
   if (group == ForestGroup::kAlways) return splat(1.0f);

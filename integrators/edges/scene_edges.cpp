@@ -90,7 +90,7 @@ float fold_contrast(const Shape& shape) {
   return static_cast<float>(most);
 }
 
-// Of such a shape two faces differ only where one of them is seen from behind.
+// Radiance of such a shape differs across an edge only where one of its faces is seen from behind.
 void drop_folds(EdgeMesh& mesh) {
   for (Edge& edge : mesh.edges)
     if (edge.edge_class == EdgeClass::kSharp) edge.edge_class = EdgeClass::kSmooth;
