@@ -61,7 +61,6 @@ class Isolines {
 
   int size() const { return static_cast<int>(lines_.size()); }
   const Line& line(int j) const { return lines_[j]; }
-  int64_t all_crossings() const { return static_cast<int64_t>(sorted_.size()); }
   std::span<const Crossing> crossings(int j) const {
     return {sorted_.data() + starts_[j], sorted_.data() + starts_[j + 1]};
   }

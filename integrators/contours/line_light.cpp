@@ -111,7 +111,6 @@ struct LineLight::Receiver {
 struct LineLight::Scratch {
   std::vector<ContourArc> arcs;
   Isolines isolines;
-  LineWork work;
   std::vector<Vec3d> polygon, planes;
   std::vector<PolygonSide<double>> sides;
 };
@@ -122,15 +121,11 @@ LineLight::Scratch& LineLight::scratch() {
   return *owned;
 }
 
-const LineWork& LineLight::work() { return scratch().work; }
-
 void LineLight::list(const ContourPoint& at, const DirectionCone& cone,
                      const ContourScreen* screen) const {
   Scratch& own = scratch();
   own.arcs.clear();
   contours_.list(at, cone, screen, own.arcs);
-  ++own.work.lists;
-  own.work.arcs += static_cast<int64_t>(own.arcs.size());
 }
 
 void LineLight::check(const Scene& scene, const std::string& method) {
@@ -187,17 +182,17 @@ void LineLight::find_overlaps(int threads) {
 }
 
 LineLight::LineLight(const Scene& scene, const RayTracer& tracer, int threads,
-                     const LineOptions& options, bool direct,
-                     std::shared_ptr<const Environment> sky)
-    : scene_(scene), contours_(scene, tracer, threads), options_(options), sky_(std::move(sky)) {
+                     const LineOptions& options, bool direct)
+    : scene_(scene), contours_(scene, tracer, threads), options_(options) {
   if (!direct) return;
   check(scene, options_.method);
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
     if (scene.shapes[s].is_emitter) add_emitter(ShapeId(s));
   }
-  if (has_emitters()) find_overlaps(threads);
-  if (!sky_ || !sky_->grid()) return;
-  columns_ = std::make_unique<RadianceColumns>(*sky_, threads);
+  if (!emitters_.empty()) find_overlaps(threads);
+  const Environment* sky = scene.environment.get();
+  if (!sky || !sky->grid()) return;
+  columns_ = std::make_unique<RadianceColumns>(*sky, threads);
   if (options_.uniform) return;
   std::vector<double> brightness = columns_->brightness();
   for (int k = 0; k < 2; ++k) {
@@ -270,7 +265,6 @@ V LineLight::sum_over_lines(const ContourPoint& at, const Pencil& pencil,
   const bool open = !all || w != 0;
   const auto once = [&](double shift) {
     lines.build(pencil, count, shift, at, own.arcs);
-    own.work.crossings += lines.all_crossings();
     V sum{};
     for (int j = 0; j < count; ++j) {
       const Isolines::Line& line = lines.line(j);
@@ -339,7 +333,7 @@ Rgb<double> LineLight::sky_light(const Receiver& receiver, double offset) const 
   const Vec3d planes[] = {at.up, receiver.n};
   const Pencil pencil = pencil_around(pole_between(at.up, receiver.n));
   const int w = contours_.count(at, pencil.pole, nullptr);
-  const Rgb<double> radiance = sky_->radiance(at.up);
+  const Rgb<double> radiance = scene_.environment->radiance(at.up);
   const double sum =
       sum_over_lines<double>(at, pencil, planes, w, nullptr, {options_.lines, offset},
                              [&](const Isolines::Line&, const Azimuth& from, const Azimuth& to) {
@@ -467,7 +461,7 @@ Rgb<double> LineLight::emitters(const SurfacePoint<double>& surface,
 
 Rgb<double> LineLight::environment(const SurfacePoint<double>& surface,
                                    const Scattering<double>& scattering, double offset) const {
-  if (!sky_) return {};
+  if (!scene_.environment) return {};
   const Receiver receiver = receiver_at(surface, scattering);
   list(receiver.at, {}, nullptr);
   return columns_ ? map_light(receiver, offset) : sky_light(receiver, offset);

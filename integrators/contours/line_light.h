@@ -31,21 +31,12 @@ struct LineOptions {
 };
 inline constexpr int kMostLines = 1 << 14;
 
-// What sums over lines have to do, in numbers that are the same on all machines.
-struct LineWork {
-  int64_t lists = 0;        // of contours, in the sky or before an emitter
-  int64_t arcs = 0;         // that these have
-  int64_t crossings = 0;    // of arcs and lines
-  int64_t evaluations = 0;  // by quadrature
-};
-
 class LineLight {
  public:
   // The scene and its tracer must outlive it. direct: whether emitters() and environment() are to
-  // be called; InputError where check() says so, and for emitters that lie in one place. sky: what
-  // environment() is to integrate, the scene's own or a part of it; none: nothing.
+  // be called; InputError where check() says so, and for emitters that lie in one place.
   LineLight(const Scene& scene, const RayTracer& tracer, int threads, const LineOptions& options,
-            bool direct, std::shared_ptr<const Environment> sky);
+            bool direct);
 
   // InputError, with the place in the scene's file and what to do, for a scene whose direct light
   // lines do not know: delta lights, BSDFs that are not diffuse, interpolated normals after
@@ -67,11 +58,8 @@ class LineLight {
   // uniform: along meridians of the record's grid.
   void record(const SurfacePoint<double>& surface, const Scattering<double>& scattering,
               double offset, double weight, SkyRecord& record) const;
-  bool has_emitters() const { return !emitters_.empty(); }
   // How many sums ended at kMostLines above the tolerance, so far.
   int64_t missed() const { return missed_; }
-  // What the calling thread has done so far, for all of them.
-  static const LineWork& work();
 
   ContourPoint at(const SurfacePoint<double>& surface, const Vec3d& up) const {
     return contours_.at(surface, up);
@@ -91,7 +79,7 @@ class LineLight {
   struct Scratch;
   static Scratch& scratch();
 
-  // All contours into scratch(), counted.
+  // All contours into scratch().
   void list(const ContourPoint& at, const DirectionCone& cone, const ContourScreen* screen) const;
   void find_overlaps(int threads);
   void add_emitter(ShapeId id);
@@ -112,7 +100,6 @@ class LineLight {
   Contours contours_;
   LineOptions options_;
   std::vector<Emitter> emitters_;
-  std::shared_ptr<const Environment> sky_;
   std::unique_ptr<RadianceColumns> columns_;  // of a map
   // Lines from its pole, and from the opposite one, dense where it is bright.
   std::vector<AzimuthWarp> warps_;

@@ -150,10 +150,6 @@ RenderResult render(const Scene& scene, const RunSettings& requested,
   if (settings.store) identify(*settings.store, options);
   const EstimatorList estimators = estimators_of(scene, settings, options);
   const auto* around = dynamic_cast<const VisibilityEstimator*>(estimators[0].get());
-  if (settings.store && around) {
-    // Other machines must have chosen the same.
-    settings.store->identify("choice of the pilot", fingerprint(around->choice()));
-  }
   RenderResult result = run(scene, estimators, settings, watch, options);
   if (options.method->blurs) {
     result.warnings.push_back(

@@ -142,12 +142,11 @@ std::vector<MethodType> term_methods() {
   for (MethodType& row : methods) {
     if (row.name == "forest") row.defaults = {Task::kFit};
     if (row.name != "silhouettes") continue;
-    row.description += "; images: as lines, or as rays where these take less time";
+    row.description += "; images: as lines";
     row.set_up = [gradients = row.set_up](MethodType& to) {
       gradients(to);
       to.image.reset();
-      if (!to.is_variant())
-        to.image = ImageMethod{.looks_around = true, .by_lines = true, .chooses = true};
+      if (!to.is_variant()) to.image = ImageMethod{.looks_around = true, .by_lines = true};
     };
   }
   return methods;

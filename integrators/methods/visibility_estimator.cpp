@@ -14,16 +14,10 @@
 namespace limn {
 namespace {
 
-// By lines alone: points of the film for emitters for one for the sky, where there are both. Lines
+// By lines: points of the film for emitters for one for the sky, where there are both. Lines
 // through the sky take the time of some tens of those through emitters, while most of what is left
 // to the film is the rims of shadows of emitters. Not tuned.
 constexpr int kEmitterPoints = 16;
-// What a pilot counts, in units of a ray (0.17 us): a point of the film besides its ray, and
-// LineWork, as fitted to the times of the points of cad.xml, plant.xml, sun.xml, soft_shadow.xml
-// and soft_lamp.xml; means over each of these come out within a quarter.
-constexpr double kPointCost = 1.5, kListCost = 12, kArcCost = 0.7, kCrossingCost = 1.8,
-                 kEvaluationCost = 0.45;
-constexpr uint64_t kPilotSeed = 0x9170;
 
 // The scene, if its camera is one that this looks through: InputError for others.
 const Scene& with_pinhole(const Scene& scene, const RenderOptions& options) {
@@ -58,84 +52,22 @@ VisibilityEstimator::VisibilityEstimator(const Scene& scene, const RunSettings& 
   const bool direct = options.what == RenderWhat::kImage;
   const ImageMethod& method = *options.method->image;
   if (method.by_lines) check_doubling(options);
-  const bool chooses = method.chooses && options.tolerance == 0;
-  std::shared_ptr<const Environment> sky = scene.environment;
-  if (chooses && direct && sky) split_ = split_environment(*sky, settings.threads);
-  if (split_) sky = split_->rest;
   if (method.by_lines) {
     const LineOptions lines{options.lines, options.tolerance, method.uniform_lines,
                             options.method.name()};
-    lines_ = std::make_unique<LineLight>(scene, *tracer_, settings.threads, lines, direct, sky);
+    lines_ = std::make_unique<LineLight>(scene, *tracer_, settings.threads, lines, direct);
   } else if (direct) {
     check_direct_light(scene, options.method.name());
   }
   if (direct) add_emitters();
-  if (!chooses) {
-    plan_ = fixed_plan(method.by_lines);
-    return;
-  }
-  const std::vector<VisibilityPart> all = parts();
-  plan_ = plan_visibility(
-      scene.film, all, settings.threads, settings.interrupted,
-      [&](const PixelSample& at, VisibilityPart part, int rays, uint64_t number, uint64_t replicate,
-          double reach) {
-        const uint64_t seed = mix_bits(seed_ + kPilotSeed);
-        return probe({at, part, number, rays, part == all[0], seed, seed + replicate, reach});
-      });
+  looks_ = looks();
 }
 
-std::vector<VisibilityPart> VisibilityEstimator::parts() const {
-  if (options_.what != RenderWhat::kImage) return {VisibilityPart::kSky};
-  std::vector<VisibilityPart> parts;
-  if (!emitters_.empty() || !scene_.environment) parts.push_back(VisibilityPart::kEmitters);
-  if (split_) parts.push_back(VisibilityPart::kPatches);
-  if (scene_.environment) parts.push_back(VisibilityPart::kSky);
-  return parts;
-}
-
-VisibilityPlan VisibilityEstimator::fixed_plan(bool by_lines) const {
-  VisibilityPlan plan;
-  const Film& film = scene_.film;
-  plan.grid.x0 = film.crop_x, plan.grid.y0 = film.crop_y;
-  plan.grid.cell = std::max(film.crop_width, film.crop_height);
-  if (!by_lines) {
-    plan.parts = {VisibilityPart::kAll};
-    plan.looks = {{options_.rays, 1}};
-    return plan;
-  }
-  plan.parts = parts();
-  plan.looks.assign(plan.parts.size(), {});
-  if (plan.parts.size() > 1) plan.looks[0].points = kEmitterPoints;
-  return plan;
-}
-
-std::vector<double> VisibilityEstimator::choice() const {
-  std::vector<double> numbers;
-  for (const VisibilityLook& look : plan_.looks) {
-    numbers.insert(numbers.end(), {double(look.rays), double(look.points)});
-  }
-  return numbers;
-}
-
-VisibilityProbe VisibilityEstimator::probe(const Point& point) const {
-  const LineWork before = LineLight::work();
-  RayCount rays;
-  VisibilityProbe result;
-  const FilmPosition film = place(point);
-  result.x = film.x, result.y = film.y;
-  try {
-    result.value = film_point(point, nullptr, rays);
-  } catch (const UntraceableRay&) {
-    // The run itself reports it.
-  }
-  const LineWork& after = LineLight::work();
-  result.point_cost = kPointCost + static_cast<double>(rays.closest);
-  result.cost = result.point_cost + static_cast<double>(rays.shadow) +
-                kListCost * static_cast<double>(after.lists - before.lists) +
-                kArcCost * static_cast<double>(after.arcs - before.arcs) +
-                kCrossingCost * static_cast<double>(after.crossings - before.crossings) +
-                kEvaluationCost * static_cast<double>(after.evaluations - before.evaluations);
-  return result;
+std::vector<VisibilityEstimator::Look> VisibilityEstimator::looks() const {
+  if (!lines_) return {{Source::kAll, 1}};
+  if (options_.what != RenderWhat::kImage || emitters_.empty()) return {{Source::kSky, 1}};
+  if (!scene_.environment) return {{Source::kEmitters, 1}};
+  return {{Source::kEmitters, kEmitterPoints}, {Source::kSky, 1}};
 }
 
 void VisibilityEstimator::add_emitters() {
@@ -173,17 +105,18 @@ void VisibilityEstimator::add_pixels(std::span<const KeyedSample> samples, Sampl
   sink.cost(0).samples += samples.size();
 }
 
-Rgb<double> VisibilityEstimator::sample(const PixelSample& at, SampleLog* log,
-                                        RayCount& rays) const {
+Rgb<double> VisibilityEstimator::sample(const PixelSample& at, SampleLog* log, RayCount& rays,
+                                        SkyRecord* record, double weight) const {
   Rgb<double> all;
-  for (size_t i = 0; i < plan_.parts.size(); ++i) {
-    const VisibilityLook& look = plan_.look(at.x, at.y, i);
+  for (size_t i = 0; i < looks_.size(); ++i) {
+    const auto& [source, points] = looks_[i];
+    const double share = 1.0 / points;
     Rgb<double> sum;
-    for (int k = 0; k < look.points; ++k) {
-      const uint64_t number = at.s * look.points + k;
-      sum += film_point({at, plan_.parts[i], number, look.rays, i == 0, seed_, seed_}, log, rays);
+    for (int k = 0; k < points; ++k) {
+      const uint64_t number = at.s * points + k;
+      sum += film_point({at, source, number, i == 0, record, weight * share}, log, rays);
     }
-    all += sum * (1.0 / look.points);
+    all += sum * share;
   }
   return all;
 }
@@ -191,39 +124,21 @@ Rgb<double> VisibilityEstimator::sample(const PixelSample& at, SampleLog* log,
 Rgb<double> VisibilityEstimator::record(const PixelSample& at, double weight,
                                         SkyRecord& record) const {
   RayCount rays;
-  Rgb<double> all;
-  for (size_t i = 0; i < plan_.parts.size(); ++i) {
-    const double share = 1.0 / plan_.looks[i].points;
-    for (int k = 0; k < plan_.looks[i].points; ++k) {
-      const uint64_t number = at.s * plan_.looks[i].points + k;
-      all += film_point(
-                 {at, plan_.parts[i], number, 0, i == 0, seed_, seed_, 1, &record, weight * share},
-                 nullptr, rays) *
-             share;
-    }
-  }
-  return all;
+  return sample(at, nullptr, rays, &record, weight);
 }
 
-Rng VisibilityEstimator::even(const Point& point, uint64_t seed, uint64_t number) {
+Rng VisibilityEstimator::even(const Point& point, uint64_t number) const {
   const PixelSample& at = point.at;
   const uint64_t pixel = static_cast<uint64_t>(at.y) << 32 | static_cast<uint32_t>(at.x);
   // Beyond 2^32 points another scrambling starts.
-  const uint64_t stream = (number >> 32) * 4 + static_cast<uint64_t>(point.part);
-  return Rng::even(mix_bits(seed) + stream, pixel, static_cast<uint32_t>(number));
-}
-
-FilmPosition VisibilityEstimator::place(const Point& point) const {
-  const double x = point.at.x + 0.5, y = point.at.y + 0.5;
-  const FilmPosition whole = sample_pixel_filter(scene_.film, filter_, point.at.x, point.at.y,
-                                                 even(point, point.seed, point.number));
-  if (point.reach == 1) return whole;
-  return {x + point.reach * (whole.x - x), y + point.reach * (whole.y - y)};
+  const uint64_t stream = (number >> 32) * 4 + static_cast<uint64_t>(point.source);
+  return Rng::even(mix_bits(seed_) + stream, pixel, static_cast<uint32_t>(number));
 }
 
 Rgb<double> VisibilityEstimator::film_point(const Point& point, SampleLog* log,
                                             RayCount& rays) const {
-  const FilmPosition film = place(point);
+  const FilmPosition film =
+      sample_pixel_filter(scene_.film, filter_, point.at.x, point.at.y, even(point, point.number));
   const auto start = camera_.ray(film.x, film.y);
   const Vec3d origin = start.origin, direction = start.direction;
   const bool image = options_.what == RenderWhat::kImage;
@@ -244,26 +159,25 @@ Rgb<double> VisibilityEstimator::film_point(const Point& point, SampleLog* log,
   if (log) {
     log->push_back(fmt::format("film {:.6f} {:.6f}: a point at ({:.9g}, {:.9g}, {:.9g}), {}",
                                film.x, film.y, surface.p.x, surface.p.y, surface.p.z,
-                               point.rays > 0 ? "by rays" : "by lines"));
+                               lines_ ? "by lines" : "by rays"));
   }
   Rgb<double> sum;
   if (image) {
     if (point.shows) sum = surface.emission(-direction, scene_.shading);
     if (scattering.black()) return sum;
   }
-  return sum + (point.rays > 0 ? by_rays(seen) : by_lines(seen));
+  return sum + (lines_ ? by_lines(seen) : by_rays(seen));
 }
 
 Rgb<double> VisibilityEstimator::by_lines(const Seen& seen) const {
   const Point& point = seen.point;
-  const double offset =
-      even(point, point.seed_of_look, point.number).at(Purpose::kDirect, 0).uniform();
+  const double offset = even(point, point.number).at(Purpose::kDirect, 0).uniform();
   if (options_.what == RenderWhat::kImage) {
     Rgb<double> sum;
-    if (point.has(VisibilityPart::kEmitters)) {
+    if (point.has(Source::kEmitters)) {
       sum = lines_->emitters(seen.surface, seen.scattering, offset);
     }
-    if (point.has(VisibilityPart::kSky)) {
+    if (point.has(Source::kSky)) {
       if (point.record) {
         lines_->record(seen.surface, seen.scattering, offset, point.weight, *point.record);
       } else {
@@ -279,24 +193,16 @@ Rgb<double> VisibilityEstimator::by_lines(const Seen& seen) const {
 }
 
 Rgb<double> VisibilityEstimator::by_rays(const Seen& seen) const {
-  const Point& point = seen.point;
-  const int count = point.rays;
-  const Environment* sky = scene_.environment.get();
-  if (split_) {
-    const bool patches = point.part == VisibilityPart::kPatches;
-    sky = patches ? split_->patches.get() : split_->rest.get();
-  }
-  const bool looks_up = point.part != VisibilityPart::kEmitters &&
-                        (options_.what != RenderWhat::kImage || sky != nullptr);
-  const size_t end = point.has(VisibilityPart::kEmitters) ? emitters_.size() + 1 : 1;
+  const int count = options_.rays;
+  const bool looks_up = options_.what != RenderWhat::kImage || scene_.environment;
   Rgb<double> sum;
   for (int k = 0; k < count; ++k) {
-    const Rng key = even(point, point.seed_of_look, point.number * count + k);
+    const Rng key = even(seen.point, seen.point.number * count + k);
     // The sky and every emitter have points of their own.
-    for (size_t i = looks_up ? 0 : 1; i < end; ++i) {
+    for (size_t i = looks_up ? 0 : 1; i <= emitters_.size(); ++i) {
       Rng rng = key.at(Purpose::kEmitter, i);
       const double u1 = rng.uniform(), u2 = rng.uniform();
-      sum += i == 0 ? sky_ray(sky, seen, u1, u2) : emitter_ray(emitters_[i - 1], seen, u1, u2);
+      sum += i == 0 ? sky_ray(seen, u1, u2) : emitter_ray(emitters_[i - 1], seen, u1, u2);
     }
   }
   return sum * (1.0 / count);
@@ -312,8 +218,7 @@ bool VisibilityEstimator::is_open(const Seen& seen, const Vec3d& direction) cons
 
 // Uniform over the half sphere for openness, by the cosine for the rest, but for maps, by which
 // they go themselves.
-Rgb<double> VisibilityEstimator::sky_ray(const Environment* sky, const Seen& seen, double u1,
-                                         double u2) const {
+Rgb<double> VisibilityEstimator::sky_ray(const Seen& seen, double u1, double u2) const {
   const double phi = 2 * kPi * u2;
   const auto around = [&](const Vec3d& n, double z) {
     const double r = std::sqrt(std::fmax(0.0, 1 - z * z));
@@ -325,21 +230,22 @@ Rgb<double> VisibilityEstimator::sky_ray(const Environment* sky, const Seen& see
   if (options_.what == RenderWhat::kAmbientOcclusion) {
     return grey(is_open(seen, around(seen.n, std::sqrt(u1))) ? 1.0 : 0.0);
   }
+  const Environment& sky = *scene_.environment;
   Vec3d direction;
   double pdf;
-  if (sky->is_uniform()) {
+  if (sky.is_uniform()) {
     const double z = std::sqrt(u1);
     direction = around(seen.scattering.normal(), z);
     pdf = z / kPi;
   } else {
-    const auto drawn = sky->sample_direction(u1, u2);
+    const auto drawn = sky.sample_direction(u1, u2);
     direction = drawn.direction;
     pdf = drawn.pdf;
   }
   if (!(pdf > 0)) return {};
   const Rgb<double> f = seen.scattering.eval(direction);
   if (is_black(f) || !is_open(seen, direction)) return {};
-  return f * sky->radiance(direction) * (1 / pdf);
+  return f * sky.radiance(direction) * (1 / pdf);
 }
 
 // Uniform over the emitter's area.

@@ -1,14 +1,12 @@
 #pragma once
-// How open the sky is and direct light, at what a camera sees: by lines between silhouettes, by
-// rays, or by what a pilot finds to be better. All random numbers of a pixel are even (Rng::even).
+// How open the sky is and direct light, at what a camera sees: by lines between silhouettes or by
+// rays. All random numbers of a pixel are low-discrepancy points (Rng::even).
 #include <memory>
 #include <vector>
 
 #include "integrators/contours/line_light.h"
 #include "integrators/estimates/sample_estimator.h"
-#include "integrators/lights/split_environment.h"
 #include "integrators/paths/camera_path.h"
-#include "integrators/pilot/visibility_plan.h"
 #include "limn/core/camera.h"
 #include "limn/integrators/render.h"
 
@@ -31,24 +29,25 @@ class VisibilityEstimator final : public SampleEstimator {
   // `weight` times.
   Rgb<double> record(const PixelSample& at, double weight, SkyRecord& record) const;
 
-  // Rays and points, by cell of the film and by part.
-  std::vector<double> choice() const;
   // Sums over lines that ended above the tolerance, so far.
   int64_t missed() const { return lines_ ? lines_->missed() : 0; }
 
  private:
-  // A point of the film: which of a pixel's, what of the light it is for, and by what numbers.
+  // What of the light has points of the film of its own.
+  enum class Source { kAll, kEmitters, kSky = 3 };  // as numbers, of streams of random numbers
+  struct Look {
+    Source source;
+    int points;  // of the film in a sample of a pixel
+  };
+  // A point of the film: which of a pixel's, and what of the light it is for.
   struct Point {
     PixelSample at;
-    VisibilityPart part;
-    uint64_t number;  // among the pixel's of this part
-    int rays;         // 0: by lines
-    bool shows;       // what shines at the camera belongs to it
-    uint64_t seed, seed_of_look;
-    double reach = 1;             // from the pixel's center, of the way to where it would be
-    SkyRecord* record = nullptr;  // that takes what comes from the environment
-    double weight = 1;            // there
-    bool has(VisibilityPart p) const { return part == p || part == VisibilityPart::kAll; }
+    Source source;
+    uint64_t number;    // among the pixel's of this source
+    bool shows;         // what shines at the camera belongs to it
+    SkyRecord* record;  // that takes what comes from the environment, or null
+    double weight;      // there
+    bool has(Source s) const { return source == s || source == Source::kAll; }
   };
   // What it sees.
   struct Seen {
@@ -63,31 +62,28 @@ class VisibilityEstimator final : public SampleEstimator {
     std::vector<double> areas;  // summed over its faces
   };
   void add_emitters();
-  std::vector<VisibilityPart> parts() const;
-  VisibilityPlan fixed_plan(bool by_lines) const;
-  VisibilityProbe probe(const Point& point) const;
-  Rgb<double> sample(const PixelSample& at, SampleLog* log, RayCount& rays) const;
-  FilmPosition place(const Point& point) const;
+  std::vector<Look> looks() const;
+  // record, weight: see Point.
+  Rgb<double> sample(const PixelSample& at, SampleLog* log, RayCount& rays,
+                     SkyRecord* record = nullptr, double weight = 1) const;
   Rgb<double> film_point(const Point& point, SampleLog* log, RayCount& rays) const;
   // The stream of a point, or of a ray from there.
-  static Rng even(const Point& point, uint64_t seed, uint64_t number);
+  Rng even(const Point& point, uint64_t number) const;
   Rgb<double> by_lines(const Seen& seen) const;
   Rgb<double> by_rays(const Seen& seen) const;
   Rgb<double> emitter_ray(const RayEmitter& emitter, const Seen& seen, double u1, double u2) const;
-  // sky: of an image.
-  Rgb<double> sky_ray(const Environment* sky, const Seen& seen, double u1, double u2) const;
+  Rgb<double> sky_ray(const Seen& seen, double u1, double u2) const;
   bool is_open(const Seen& seen, const Vec3d& direction) const;
 
   const Scene& scene_;
   std::unique_ptr<RayTracer> tracer_;
   uint64_t seed_;
   RenderOptions options_;
-  std::optional<SplitEnvironment> split_;
-  std::unique_ptr<LineLight> lines_;  // null: by rays alone
+  std::unique_ptr<LineLight> lines_;  // null: by rays
   std::vector<RayEmitter> emitters_;
   CameraView<double> camera_;
   FilterTable filter_;
-  VisibilityPlan plan_;
+  std::vector<Look> looks_;
 };
 
 }  // namespace limn

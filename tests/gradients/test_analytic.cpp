@@ -88,7 +88,7 @@ TEST(Analytic, LampsFromBehindAreBlack) {
           <integer name="height" value="6"/><rfilter type="box"/></film></sensor>)" +
           body + "</scene>";
       const Scene scene = read_scene_text(text, "", {}, nullptr);
-      for (const std::string method : {"analytic", "lines", "silhouettes"}) {
+      for (const std::string method : {"analytic", "lines"}) {
         RunSettings settings;
         settings.spp = 2;
         settings.threads = 1;

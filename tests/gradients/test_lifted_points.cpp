@@ -345,7 +345,7 @@ TEST(LiftedPoints, GrazingLightHasAllItsShadows) {
 TEST(LiftedPoints, MethodsShareAnImage) {
   const TempFiles files;
   for (const std::string kind : {"waves", "back", "ball"}) {
-    for (const std::string method : {"analytic", "lines", "silhouettes"}) {
+    for (const std::string method : {"analytic", "lines"}) {
       const bool lamp = method == "analytic";
       Scene scene =
           round_scene(files, kind,

@@ -149,9 +149,9 @@ TEST_F(Parts, OfAReversePassAndAnImageJoinToTheBitsOfOneRun) {
             std::string::npos);
 }
 
-// Lines and rays as a pilot chose them, which every part and the joining run must have alike.
-TEST_F(Parts, OfSilhouettesHaveOnePlan) {
-  const std::string command = "render " + scene_ + " --method silhouettes --what direct --spp 5";
+// Numbers of samples as a pilot chose them, which every part and the joining run must have alike.
+TEST_F(Parts, OfAdaptiveHaveOnePlan) {
+  const std::string command = "gradient " + scene_ + " --spp 16 --wrt screen.translate.x";
   make_parts(command);
   expect_same(command, out(), {out()});
   // As of a machine whose pilot chose otherwise.

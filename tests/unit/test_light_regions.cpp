@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include "integrators/lights/light_regions.h"
-#include "integrators/lights/split_environment.h"
 #include "limn/edgetree/edge_pieces.h"
 #include "support/environment_maps.h"
 #include "support/meshes.h"
@@ -242,37 +241,6 @@ TEST(BrightPatches, AreFoundEverywhere) {
     EXPECT_EQ(find_bright_patches(*sky_with({{axis, 3, 1000}}, 256)).size(), 1u)
         << axis.x << ' ' << axis.y << ' ' << axis.z;
   }
-}
-
-// Both maps add up to the whole, and what is bright is in one of them alone.
-TEST(BrightPatches, SplitTheMap) {
-  Rng rng(6, 0, 0);
-  for (const Vec3d& axis : {Vec3d{1, 1, 0.3}, Vec3d{0.05, 1, 0}, Vec3d{0.01, 0.3, -1}}) {
-    const auto sky = sky_with({{axis, 3, 1000}}, 256);
-    const auto split = split_environment(*sky, 2);
-    ASSERT_TRUE(split);
-    const double angle = 3 * kPi / 180, texel = 2 * kPi / 128;
-    for (int i = 0; i < 3000; ++i) {
-      // Half of them near the disc.
-      const Vec3d w = i % 2 == 0 ? random_direction(rng)
-                                 : normalize(normalize(axis) + random_direction(rng) * 0.1);
-      const double whole = sky->radiance(w).g;
-      const double bright = split->patches->radiance(w).g, rest = split->rest->radiance(w).g;
-      ASSERT_NEAR(bright + rest, whole, 1e-9 * whole);
-      EXPECT_LE(rest, 1 + 1e-6);
-      const double apart = std::acos(std::min(1.0, dot(w, normalize(axis))));
-      if (apart > 1.4 * angle + 2 * texel) {
-        EXPECT_EQ(bright, 0);
-      }
-    }
-    // Each draws what it has: none of a patch's directions is wasted on the sky.
-    for (int i = 0; i < 200; ++i) {
-      const double u = rng.uniform(), v = rng.uniform();
-      EXPECT_GT(dot(split->patches->sample_direction(u, v).direction, normalize(axis)), 0.98);
-    }
-  }
-  EXPECT_FALSE(split_environment(*sky_with({}, 64), 1));
-  EXPECT_FALSE(split_environment(*make_constant_environment({1, 1, 1}), 1));
 }
 
 TEST(BrightPatches, NoneInPlainSkies) {

@@ -2,15 +2,10 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include <atomic>
-#include <set>
-
 #include "integrators/contours/line_light.h"
-#include "integrators/lights/split_environment.h"
 #include "limn/core/error.h"
 #include "limn/integrators/compare.h"
 #include "limn/integrators/compare_images.h"
-#include "limn/integrators/parts.h"
 #include "support/over_floor.h"
 #include "support/running_mean.h"
 
@@ -37,14 +32,9 @@ TEST(LineImages, AgreesWithRaysAndPaths) {
                         Case{"smooth, lamps and sky", lamps + sky, true, 4},
                         Case{"smooth, map", make_sky(files, "map"), true, 8}}) {
     const Scene scene = over_floor(files, bodies, c.smooth, c.lights);
-    const bool sun = c.name.find("sun") != std::string::npos;
-    const bool split = scene.environment && split_environment(*scene.environment, 1).has_value();
-    ASSERT_EQ(split, sun) << c.name;
     const RenderResult lines = run(scene, "lines", c.spp);
     expect_alike(lines, run(scene, "path", 512), c.name + ", path");
-    const RenderResult rays = run(scene, "rays", 64);
-    expect_alike(lines, rays, c.name + ", rays");
-    expect_alike(run(scene, "silhouettes", 64), rays, c.name + ", silhouettes");
+    expect_alike(lines, run(scene, "rays", 64), c.name + ", rays");
   }
   for (const RenderWhat what : {RenderWhat::kAmbientOcclusion, RenderWhat::kOpenness}) {
     for (const bool smooth : {false, true}) {
@@ -57,45 +47,12 @@ TEST(LineImages, AgreesWithRaysAndPaths) {
   }
 }
 
-// What a pixel's samples are made of, as written down.
-std::set<std::string> ways(const Scene& scene, const RenderOptions& options, int x, int y) {
-  RunSettings settings;
-  settings.seed = 3;
-  std::set<std::string> found;
-  for (const std::string& line : trace_sample(scene, settings, {x, y, 0, ""}, options)) {
-    for (const std::string way : {"by lines", "by rays"}) {
-      if (line.ends_with(way)) found.insert(way);
-    }
-  }
-  return found;
-}
-
-// Both in one image, and without bias.
-TEST(LineImages, SilhouettesTakeWhatIsBetter) {
-  const TempFiles files;
-  const Scene scene =
-      over_floor(files, {{icosphere_mesh(5), 0.8, {0.2, 1.1, 0}}}, false,
-                 square("lamp", 0.6, 90, {0.4, 2.9, 0.3}, area_light("glow", "9, 8, 7")) +
-                     constant_light("sky", "0.3, 0.4, 0.5"));
-  RenderOptions options;
-  options.method = "silhouettes";
-  using Ways = std::set<std::string>;
-  EXPECT_EQ(ways(scene, options, 8, 12), (Ways{"by lines", "by rays"}));
-  expect_alike(run(scene, "silhouettes", 16), run(scene, "rays", 64), "both");
-  options.tolerance = 0.01;
-  EXPECT_EQ(ways(scene, options, 8, 12), Ways{"by lines"});
-  options.method = "rays";
-  options.tolerance = 0;
-  EXPECT_EQ(ways(scene, options, 8, 12), Ways{"by rays"});
-}
-
-// Lamps, bright patches and the rest of the sky have plans of their own.
 TEST(LineImages, ThreadsDoNotMatter) {
   const TempFiles files;
   const std::string lamp = square("lamp", 0.6, 90, {0.4, 2.9, 0.3}, area_light("glow", "9, 8, 7"));
   for (const std::string& lights : {make_sky(files, "map"), lamp + make_sun(files, "sun")}) {
     const Scene scene = over_floor(files, {{torus_mesh(16, 8), 0.8, {0.2, 1.1, 0}}}, true, lights);
-    for (const std::string method : {"lines", "rays", "silhouettes"}) {
+    for (const std::string method : {"lines", "rays"}) {
       const RenderResult one = run(scene, method, 3), three = run(scene, method, 3, {}, 3);
       for (size_t i = 0; i < one.radiance.size(); ++i) {
         ASSERT_EQ(one.radiance.mean(i), three.radiance.mean(i)) << method;
@@ -104,43 +61,17 @@ TEST(LineImages, ThreadsDoNotMatter) {
   }
 }
 
-// Films of a single pixel, and crops whose cells begin elsewhere.
-TEST(LineImages, SilhouettesOfPartsOfAFilm) {
+// Crops, down to a single pixel.
+TEST(LineImages, PartsOfAFilm) {
   const TempFiles files;
   Scene scene = over_floor(files, {{torus_mesh(16, 8), 0.8, {0.2, 1.1, 0}}}, false,
                            square("lamp", 0.6, 90, {0.4, 2.9, 0.3}, area_light("glow", "9, 8, 7")) +
                                make_sun(files, "sun"));
   Film& film = scene.film;
   film.crop_x = 5, film.crop_y = 3, film.crop_width = 10, film.crop_height = 12;
-  expect_alike(run(scene, "silhouettes", 64), run(scene, "rays", 256), "crop");
+  expect_alike(run(scene, "lines", 64), run(scene, "rays", 256), "crop");
   film.crop_x = 9, film.crop_y = 11, film.crop_width = film.crop_height = 1;
-  expect_alike(run(scene, "silhouettes", 256), run(scene, "rays", 1024), "one pixel");
-}
-
-// A store that an interrupted pilot's choice must not reach.
-TEST(LineImages, InterruptedPilotsAreNoPartOfARun) {
-  class Store final : public BatchStore {
-   public:
-    void start(int) override { started = true; }
-    Task task(int64_t) const override { return Task::kMake; }
-    BatchRecord read(int64_t) override { return {}; }
-    void write(const BatchRecord&) override {}
-    bool started = false;
-  };
-  const TempFiles files;
-  const Scene scene = over_floor(files, {}, false, constant_light("sky", "1, 1, 1"));
-  RenderOptions options;
-  options.method = "silhouettes";
-  for (const bool stop : {true, false}) {
-    const std::atomic<bool> interrupted = stop;
-    Store store;
-    RunSettings settings;
-    settings.spp = 1;
-    settings.store = &store;
-    settings.interrupted = &interrupted;
-    render(scene, settings, options);
-    EXPECT_EQ(store.started, !stop);
-  }
+  expect_alike(run(scene, "lines", 256), run(scene, "rays", 1024), "one pixel");
 }
 
 std::string refusal(const Scene& scene, const RenderOptions& options) {

@@ -30,7 +30,7 @@ ContourPoint on_floor(const Scene& scene, double x, double z) {
 
 struct Looking {
   Looking(const Scene& s, const LineOptions& options = {}, bool direct = false)
-      : tracer(make_embree_tracer(s, 1)), light(s, *tracer, 1, options, direct, s.environment) {}
+      : tracer(make_embree_tracer(s, 1)), light(s, *tracer, 1, options, direct) {}
   std::unique_ptr<RayTracer> tracer;
   LineLight light;
 };

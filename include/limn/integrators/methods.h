@@ -21,7 +21,6 @@ struct ImageMethod {
   // One vertex that looks around: direct light, and how open its sky is.
   bool looks_around = false;
   bool by_lines = false;       // between silhouettes
-  bool chooses = false;        // between these and rays
   bool uniform_lines = false;  // through a map at equal azimuths
 };
 
