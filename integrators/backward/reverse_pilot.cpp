@@ -330,18 +330,23 @@ class Pilot {
       candidates_.push_back({std::make_unique<ReverseEstimator>(
           scene, adjoint, with_method(options, method), settings.threads)});
     };
-    add("forest");
+    // What runs without a pilot: `silhouettes` has 0.001 to 2.9 times the squared error x time of
+    // `forest` in 17 scenes, 0.3 in the geometric mean.
+    const bool lists = LightRegions::any_in(scene);
+    add(lists ? "silhouettes" : "forest");
     if (!candidates_[0].has_choice()) return;
     least_ = least_samples();
     if (settings.spp < least_) return;
     probe_ = std::make_unique<Probe>(*candidates_[0].estimator, settings, watch);
     looks_ = fits(settings);
     const bool draws = candidates_[0].estimator->draws_at_vertices();
-    if (looks_ && draws && LightRegions::any_in(scene)) add("silhouettes");
+    if (!looks_ || !draws || !lists) return;
+    add("forest");
+    std::swap(candidates_[0], candidates_[1]);
   }
 
   ReversePlan plan(RunSettings& settings) {
-    if (!looks_) return {std::move(candidates_[0].estimator), ""};
+    if (!looks_) return without();
     for (Candidate& candidate : candidates_) measure(candidate);
     if (candidates_.size() > 1) raise_unseen();
     const std::vector<double> units = candidates_[0].errors(candidates_[0].usual());
@@ -361,11 +366,11 @@ class Pilot {
       }
     }
     if (settings.seconds > 0) {
-      const double work = candidates_[0].work(usual.samples);
-      const double ratio = gains && work > 0 ? chosen->work(best.samples) / work : 1;
+      const double timed = candidates_.back().work(candidates_.back().usual());
+      const double ratio = timed > 0 ? chosen->work(best.samples) / timed : 1;
       if (!leaves_time(settings, ratio)) {
         stay_below(settings);
-        return {std::move(candidates_[0].estimator), ""};
+        return without();
       }
       settings.least_spp = std::max(settings.least_spp, least_);
     }
@@ -380,6 +385,7 @@ class Pilot {
   }
 
  private:
+  ReversePlan without() { return {std::move(candidates_.back().estimator), ""}; }
   // Of a run of which pilots are no more than their share.
   int least_samples() const {
     double numbers = 0;

@@ -64,9 +64,9 @@ TEST(ReversePilot, LeavesShortRunsAlone) {
   const TempFiles files;
   const Scene scene = shadowed(files);
   const BackwardResult chosen = run(scene, "adaptive", 16, 3);
-  EXPECT_EQ(chosen.method, "forest");
+  EXPECT_EQ(chosen.method, "silhouettes");
   EXPECT_EQ(chosen.decision, "");
-  EXPECT_EQ(means(chosen), means(run(scene, "forest", 16, 3)));
+  EXPECT_EQ(means(chosen), means(run(scene, "silhouettes", 16, 3)));
 }
 
 TEST(ReversePilot, ChoosesAlikeOnAnyNumberOfThreads) {
@@ -86,7 +86,8 @@ TEST(ReversePilot, BeginsWithTheLeastSamples) {
   int spp = 78;
   while (run(scene, "adaptive", spp, 3).decision.empty()) ASSERT_LT(++spp, 96);
   ASSERT_GT(spp, 78);
-  EXPECT_EQ(means(run(scene, "adaptive", spp - 1, 3)), means(run(scene, "forest", spp - 1, 3)));
+  EXPECT_EQ(means(run(scene, "adaptive", spp - 1, 3)),
+            means(run(scene, "silhouettes", spp - 1, 3)));
 }
 
 TEST(ReversePilot, SaysThatNumbersKeepItOff) {
