@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <numeric>
 
+#include "integrators/paths/traced_scene.h"
 #include "integrators/pilot/term_estimator.h"
+#include "integrators/terms/term_table.h"
 #include "limn/integrators/gradient.h"
 #include "limn/integrators/methods.h"
 #include "support/meshes.h"
@@ -117,6 +119,93 @@ TEST(MovingDirections, KeepTheMeanOfLinesToFirstVertices) {
                   std::sqrt(turned.variance(0) + held.variance(0)));
     }
     EXPECT_GE(summarize(z).p_largest, 1e-4) << summarize(z).largest;
+  }
+}
+
+// What directions that turn carry along, number by number: a point seen from outside the one object
+// that moves, where they follow a plane, and from within it, where they rotate.
+TEST(MovingDirections, CarryPointsAtTheirRatesPerTurn) {
+  const TempFiles files;
+  Scene scene = gloss_scene(files, 0.2);
+  find_parameter(scene, "ball.translate.x").seed(scene, 0);
+  const MotionRates rates(scene, 1, {1, 1, 1, 1});
+  const Vec3d to{0.3, -0.5, 0.2}, g{0.7, 0.4, -0.6};
+  for (const bool follows : {true, false}) {
+    const Vec3d p = follows ? Vec3d{-1, 0.1, 2} : Vec3d{0.2, 1.01, 0};
+    const Vec3d per_turn = rates.per_turn(p, to, g);
+    for (int k = 0; k < 3; ++k) {
+      DirectionField field;
+      field.turn[k][0] = 1;
+      const DirectionTurn turn = rates.motion_at(p, field).turn;
+      EXPECT_EQ(turn.follows(), follows);
+      const Vec3<Lanes> v = turn.velocity(to);
+      const double rate = v.x[0] * g.x + v.y[0] * g.y + v.z[0] * g.z;
+      EXPECT_GT(std::fabs(rate), 0);
+      EXPECT_NEAR(per_turn[k], rate, 1e-12 * std::fabs(rate));
+    }
+  }
+}
+
+// Keeps what samples of the film come to.
+class FormSink final : public FilmSink {
+ public:
+  FormSink() { book_on(cost_); }
+  bool at(const FilmPlace&) override { return true; }
+  bool takes(const BoundaryForm& form, const Rng&) override {
+    forms.push_back(form);
+    return false;
+  }
+  void add(const Rgb<double>&) override {}
+  void add_line(const FilmLineSample&, const Rgb<double>&) override {}
+
+  std::vector<BoundaryForm> forms;
+
+ private:
+  TermCost cost_;
+};
+
+// A line that ends at a first vertex says how directions there turn what the vertex sees: all that
+// the sample has but the vertex itself.
+TEST(MovingDirections, TurnLinesToFirstVertices) {
+  const TempFiles files;
+  SceneParts parts;
+  parts.body = square("floor", 2.5, -90, {0, 0, 0}, diffuse("chalk", "0.8, 0.7, 0.6")) +
+               obj_shape("body", write_mesh(files, "body.obj", cube_mesh()), true, 0.6, {0, 0.7, 0},
+                         conductor("metal", 0.16)) +
+               square("lamp", 0.1, 90, {-0.2, 2.7, -0.4}, area_light("glow", "60, 50, 40")) +
+               R"(<emitter type="point" id="bulb"><point name="position" value="0.7,3,0.1"/>
+                  <rgb name="intensity" value="9,9,9"/></emitter>)";
+  Scene scene = make_scene(files, parts);
+  find_parameter(scene, "body.translate.y").seed(scene, 0);
+  const TracedScene traced(scene, 1, {.edges = true});
+  TermInput input(traced.context(), 1, {1, 1, 1, 1}, edge_sampler_type("silhouettes"), 1);
+  for (const auto make : {make_penumbra_term, make_shadow_term, make_boundary_term}) {
+    const size_t faces = make == make_boundary_term ? 1 : 2;  // those of fewer are seen directly
+    const auto term = make(input);
+    FormSink sink;
+    for (int i = 0; i < 4000; ++i) {
+      const Rng key(51, i, 0);
+      term->sample_film(Rng(key).uniform(), key, sink);
+    }
+    int lines = 0;
+    for (const BoundaryForm& form : sink.forms) {
+      const auto all = form.all();
+      const auto is_face = [](const MovingPoint& p) { return p.of == MovingPoint::Of::kFace; };
+      if (static_cast<size_t>(std::ranges::count_if(all, is_face)) < faces) continue;
+      ++lines;
+      ASSERT_TRUE(form.turned);
+      Vec3d sum = form.turned->g;
+      for (const MovingPoint& p : all.first(all.size() - 1)) sum = sum + p.g;
+      EXPECT_LT(length(sum), 1e-12 * length(form.turned->g));
+      EXPECT_LT(length(form.turned->vertex - form.x), 1e-12);
+      const auto [mesh, edge, t] = std::tuple(all[0].mesh, all[0].edge, all[0].t);
+      const auto& ends = mesh->edge(edge.edge).vertices;
+      const Vec3d seen = faces > 1
+                             ? std::ranges::find_if(all, is_face)->x
+                             : mesh->position(ends[0]) * (1 - t) + mesh->position(ends[1]) * t;
+      EXPECT_LT(length(form.turned->vertex + form.turned->to - seen), 1e-12);
+    }
+    EXPECT_GT(lines, 20);
   }
 }
 
