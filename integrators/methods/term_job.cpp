@@ -370,7 +370,6 @@ class TermJob {
         method_.moves_directions && can_move_directions() && !estimator.motion_rates().still();
     SamplePlan probing;
     probing.splits = plan.splits;
-    if (method_.spreads_samples) probing.light_samples = kPilotLights;
     estimator.set_plan(probing);
     const bool film = film_pilot_samples(settings.spp) > 0 && can_move_film() &&
                       !method_.random_directions && !estimator.motion_rates().still();
@@ -486,13 +485,10 @@ class TermJob {
     return std::span(parameters_).subspan(p * kLanes, static_cast<size_t>(pass(p).lanes()));
   }
 
-  // Each parameter counts alike: its variances are divided by their sum. Sets the plan's light
-  // samples; units: to these sums.
+  // Each parameter counts alike: its variances are divided by their sum. units: these sums.
   std::vector<TermFigures> figures_of(const TermEstimator& estimator, const Probed& probed,
-                                      SamplePlan& plan, std::vector<double>& units) const {
-    const auto& [pilot, fit] = probed;
-    TermFigures light;
-    light.cells.resize(pilot.grid.size());
+                                      std::vector<double>& units) const {
+    const PilotFigures& pilot = probed.pilot;
     std::vector<TermFigures> figures(types_.size());
     for (size_t t = 0; t < figures.size(); ++t) {
       figures[t].cost = pilot.work[t];
@@ -511,15 +507,6 @@ class TermJob {
         figures[t].variance += means[t] / sum;
         for (size_t i = 0; i < cells[t].size(); ++i) figures[t].cells[i] += cells[t][i] / sum;
       }
-      const auto lights = fit.variances.empty() ? pilot.variances(figures.size(), lane)
-                                                : fit.variances[lane][figures.size()];
-      light.variance += trimmed_mean(lights) / sum;
-      for (size_t i = 0; i < lights.size(); ++i) light.cells[i] += lights[i] / sum;
-    }
-    // Paths that only lead to vertices take no more light than they must.
-    if (method_.spreads_samples && computed_[estimator.pixel_slot()]) {
-      light.cost = pilot.light_work;
-      plan.light_samples = choose_lights(kPilotLights, light, figures[estimator.pixel_slot()]);
     }
     return figures;
   }
@@ -536,7 +523,7 @@ class TermJob {
                  SamplePlan& plan) const {
     const auto& [pilot, fit] = probed;
     std::vector<double> units;
-    const std::vector<TermFigures> figures = figures_of(estimator, probed, plan, units);
+    const std::vector<TermFigures> figures = figures_of(estimator, probed, units);
     double price;
     if (method_.spreads_samples && !options_.uniform_samples) {
       price = spread_samples(figures, pilot.grid, plan, most);

@@ -65,8 +65,6 @@ class PathTracer {
     static_assert(kColoursAlone<S, Visitor>);
     colours_ = &colours;
   }
-  // How many light samples are averaged at every vertex but the first.
-  void take_light_samples(int count) { light_samples_ = count; }
 
   // Radiance that arrives at the origins of rays against their directions; rays[i] belongs to
   // walks[i], at most kMostWalks of them. What cannot be traced has `failed`.
@@ -189,7 +187,6 @@ class PathTracer {
   const MotionRates* splitting_ = nullptr;
   DirectionWarper* warper_ = nullptr;
   const MovingColours* colours_ = nullptr;
-  int light_samples_ = 1;
   bool wide_ = false;
   bool scatters_wide_ = false;
 };

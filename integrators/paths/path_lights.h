@@ -76,14 +76,9 @@ inline void PathTracer<S, Visitor>::add_light(Walk& walk) const {
 template <class S, class Visitor>
 inline void PathTracer<S, Visitor>::add_lights(Walk& walk, int count) {
   const Rgb<S> share = walk.throughput * (1.0 / count);
-  PathSums<S>& sums = walk.sums;
   for (int i = 0; i < count; ++i) {
     const Rng copy = walk.key.copy(Purpose::kLightCopy, i);
-    const Rgb<S> light = share * direct_light(walk, copy);
-    sums.radiance += light;
-    if (walk.bounces == 0) continue;
-    sums.light_difference =
-        i % 2 == 0 ? sums.light_difference + light : sums.light_difference - light;
+    walk.sums.radiance += share * direct_light(walk, copy);
   }
   walk.light.reset();
 }

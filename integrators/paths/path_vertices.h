@@ -57,10 +57,8 @@ inline bool PathTracer<S, Visitor>::begin_vertex(Walk& walk) {
     });
   }
   const int more = splits(walk.surface, walk.copies);
-  const int lights = (walk.bounces > 0 ? light_samples_ : 1) * more;
-  if (walk.bounces > 0) walk.sums.later_lights += lights;
-  walk.lit = lights > 1 || warper_;
-  if (walk.lit) add_lights(walk, lights);
+  walk.lit = more > 1 || warper_;
+  if (walk.lit) add_lights(walk, more);
   if (more > 1) split(walk, more);
   return true;
 }

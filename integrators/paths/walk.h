@@ -31,10 +31,6 @@ template <class S>
 struct PathSums {
   Rgb<S> radiance;
   Rgb<Lanes> score;  // sum of the scores: has mean zero, and belongs to the interior term
-  // With an even number of light samples: half of what every first makes more than the second, at
-  // all vertices but the first. It has mean zero, and the variance of their mean.
-  Rgb<S> light_difference;
-  uint64_t later_lights = 0;  // light samples behind it
 };
 
 // The visitor of paths whose vertices no parameter moves. Their places and directions, and all that

@@ -272,29 +272,6 @@ Lanes survival_of(const TracedDraws& traced, double price, std::span<const doubl
   return survival;
 }
 
-int best_light_samples(double variance, double cost, const LightFigures& light) {
-  constexpr double kGain = 0.95;  // more must be worth it; not tuned
-  const auto product = [&](int n) {
-    return (variance + light.variance / n) * (cost + light.cost * n);
-  };
-  int best = 1;
-  for (const int n : {2, 4, 8}) {
-    if (product(n) < kGain * product(best)) best = n;
-  }
-  return best;
-}
-
-int choose_lights(int taken, const TermFigures& light, TermFigures& paths) {
-  const double bare = paths.cost - taken * light.cost;
-  const int best = best_light_samples(paths.variance - light.variance, bare,
-                                      {taken * light.variance, light.cost});
-  const double change = static_cast<double>(taken) / best - 1;
-  paths.cost = bare + best * light.cost;
-  paths.variance += change * light.variance;
-  for (size_t i = 0; i < paths.cells.size(); ++i) paths.cells[i] += change * light.cells[i];
-  return best;
-}
-
 double trimmed_mean(std::vector<double> values) {
   std::sort(values.begin(), values.end());
   const size_t kept = values.size() - values.size() / 1000;

@@ -57,18 +57,6 @@ double price_of(const std::vector<TermFigures>& figures, const SampleCounts& cou
 // of the squared error of every parameter; where one is 0, all draws are traced.
 Lanes survival_of(const TracedDraws& traced, double price, std::span<const double> units);
 
-// Light samples of a path: what one of them adds to its variance, and what it costs.
-struct LightFigures {
-  double variance = 0, cost = 0;
-};
-// How many light samples of each path, of 1, 2, 4 and 8, give the least product of what a path is
-// left with and what it costs. variance, cost: of a path without any.
-int best_light_samples(double variance, double cost, const LightFigures& light);
-
-// The same for the paths of a pilot that took `taken` of them: light.variance is what all of them
-// add there. The paths' figures become those with the result.
-int choose_lights(int taken, const TermFigures& light, TermFigures& paths);
-
 // Without the thousandth of the values that is largest: single bright samples would rule a choice.
 double trimmed_mean(std::vector<double> values);
 

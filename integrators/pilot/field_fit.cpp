@@ -14,11 +14,6 @@ namespace {
 
 using Coefficients = Eigen::Matrix<double, kUnknowns, 1>;
 
-// Which unknowns a fit uses: [first, first + count).
-struct Basis {
-  int first, count;
-};
-constexpr Basis kBases[] = {{0, 6}, {0, 3}, {3, 3}};
 constexpr int kRadii[] = {1, 2, 4};
 constexpr int kHeld = -1;
 constexpr int kJudgeRadius = 4;
@@ -68,50 +63,29 @@ struct Prior {
   }
 };
 
-// Least squares with a part of the unknowns, for any of the parameters.
+// Least squares, for any of the parameters.
 class Fit {
  public:
-  Fit(const Covariances& c, const Basis& basis, const Prior& prior)
-      : c_(c), basis_(basis), prior_(prior), size_(prior.size_of(c)) {
-    if (basis.count == 3) {
-      decompose(three_);
-    } else {
-      decompose(six_);
+  Fit(const Covariances& c, const Prior& prior) : c_(c) {
+    const double size = prior.size_of(c);
+    Eigen::Matrix<double, kUnknowns, kUnknowns> a;
+    for (int i = 0; i < kUnknowns; ++i) {
+      for (int j = 0; j < kUnknowns; ++j) a(i, j) = c.of(i, j);
+      a(i, i) = (1 + kRidge) * a(i, i) + kLeast * size * prior.unknowns[i];
     }
+    solver_.compute(a);
   }
   Coefficients of(int parameter) const {
-    return basis_.count == 3 ? solve(three_, parameter) : solve(six_, parameter);
+    Coefficients b;
+    for (int i = 0; i < kUnknowns; ++i) b[i] = -c_.with(parameter, i);
+    const Coefficients solved = solver_.solve(b);
+    if (!solved.allFinite()) return Coefficients::Zero();
+    return solved;
   }
 
  private:
-  template <int kCount>
-  using Solver = Eigen::LDLT<Eigen::Matrix<double, kCount, kCount>>;
-
-  template <int kCount>
-  void decompose(Solver<kCount>& solver) const {
-    Eigen::Matrix<double, kCount, kCount> a;
-    for (int i = 0; i < kCount; ++i) {
-      for (int j = 0; j < kCount; ++j) a(i, j) = c_.of(basis_.first + i, basis_.first + j);
-      a(i, i) = (1 + kRidge) * a(i, i) + kLeast * size_ * prior_.unknowns[basis_.first + i];
-    }
-    solver.compute(a);
-  }
-  template <int kCount>
-  Coefficients solve(const Solver<kCount>& solver, int parameter) const {
-    Eigen::Matrix<double, kCount, 1> b;
-    for (int i = 0; i < kCount; ++i) b[i] = -c_.with(parameter, basis_.first + i);
-    const Eigen::Matrix<double, kCount, 1> solved = solver.solve(b);
-    Coefficients result = Coefficients::Zero();
-    if (solved.allFinite()) result.template segment<kCount>(basis_.first) = solved;
-    return result;
-  }
-
   Covariances c_;
-  Basis basis_;
-  const Prior& prior_;
-  double size_;
-  Solver<3> three_;
-  Solver<6> six_;
+  Eigen::LDLT<Eigen::Matrix<double, kUnknowns, kUnknowns>> solver_;
 };
 
 // Sums of n numbers.
@@ -138,7 +112,7 @@ CellCovariances window_row(const PlanGrid& grid, const CellCovariances& cells, i
   return sums;
 }
 
-// The index of a fit, or kHeld, for every parameter and cell.
+// The index of a window, or kHeld, for every parameter and cell.
 using Choice = std::vector<std::vector<int>>;
 
 class Fitter {
@@ -225,23 +199,17 @@ class Fitter {
     }
   }
 
-  // Of all parameters and bases, with windows of one size: the cross-validated variance of a cell.
-  using Left = std::vector<std::array<std::vector<double>, std::size(kBases)>>;
-  Left left_by(int radius) const {
-    Left left(parameters_);
-    for (auto& bases : left) {
-      for (auto& values : bases) values.resize(grid_.size());
-    }
+  // Of all parameters, with windows of one size: the cross-validated variance of every cell.
+  std::vector<std::vector<double>> left_by(int radius) const {
+    std::vector<std::vector<double>> left(parameters_, std::vector<double>(grid_.size()));
     parallel_for(grid_.rows, threads_, [&](size_t y) {
       const CellCovariances sums[2] = {row(0, radius, y), row(1, radius, y)};
       for (int x = 0; x < grid_.columns; ++x) {
         const size_t cell = y * grid_.columns + x;
-        for (size_t b = 0; b < std::size(kBases); ++b) {
-          const Fit first(sums[0][x], kBases[b], prior_), second(sums[1][x], kBases[b], prior_);
-          for (int k = 0; k < parameters_; ++k) {
-            left[k][b][cell] = 0.5 * (variance_with(total_[1][cell], k, first.of(k)) +
-                                      variance_with(total_[0][cell], k, second.of(k)));
-          }
+        const Fit first(sums[0][x], prior_), second(sums[1][x], prior_);
+        for (int k = 0; k < parameters_; ++k) {
+          left[k][cell] = 0.5 * (variance_with(total_[1][cell], k, first.of(k)) +
+                                 variance_with(total_[0][cell], k, second.of(k)));
         }
       }
     });
@@ -261,15 +229,13 @@ class Fitter {
       for (double& v : least[k]) v *= kConvincing;
     }
     for (int r = 0; r < static_cast<int>(std::size(kRadii)); ++r) {
-      const Left left = left_by(kRadii[r]);
+      const std::vector<std::vector<double>> left = left_by(kRadii[r]);
       for (int k = 0; k < parameters_; ++k) {
-        for (int b = 0; b < static_cast<int>(std::size(kBases)); ++b) {
-          const std::vector<double> judged = window_means(grid_, left[k][b], kJudgeRadius);
-          for (size_t i = 0; i < size; ++i) {
-            if (!(judged[i] < least[k][i])) continue;
-            least[k][i] = judged[i];
-            chosen[k][i] = r * static_cast<int>(std::size(kBases)) + b;
-          }
+        const std::vector<double> judged = window_means(grid_, left[k], kJudgeRadius);
+        for (size_t i = 0; i < size; ++i) {
+          if (!(judged[i] < least[k][i])) continue;
+          least[k][i] = judged[i];
+          chosen[k][i] = r;
         }
       }
     }
@@ -306,7 +272,7 @@ class Fitter {
   template <class Visit>
   void for_fits(const Choice& chosen, const Visit& visit) const {
     for (int r = 0; r < static_cast<int>(std::size(kRadii)); ++r) {
-      const auto uses = [&](int f) { return f != kHeld && f / int(std::size(kBases)) == r; };
+      const auto uses = [&](int window) { return window == r; };
       parallel_for(grid_.rows, threads_, [&](size_t y) {
         const size_t first = y * grid_.columns;
         const auto any = [&](const std::vector<int>& fits) {
@@ -319,11 +285,9 @@ class Fitter {
         add(both.entries(0), sums[1].entries(0), both.size() * grid_.columns);
         for (int k = 0; k < parameters_; ++k) {
           for (int x = 0; x < grid_.columns; ++x) {
-            const int fit = chosen[k][first + x];
-            if (!uses(fit)) continue;
-            const Basis& basis = kBases[fit % std::size(kBases)];
-            visit(k, first + x, Fit(sums[0][x], basis, prior_).of(k),
-                  Fit(sums[1][x], basis, prior_).of(k), Fit(both[x], basis, prior_).of(k));
+            if (!uses(chosen[k][first + x])) continue;
+            visit(k, first + x, Fit(sums[0][x], prior_).of(k), Fit(sums[1][x], prior_).of(k),
+                  Fit(both[x], prior_).of(k));
           }
         }
       });

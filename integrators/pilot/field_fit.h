@@ -15,9 +15,9 @@ struct FieldFit {
 
 // From a pilot that looked at turns. For every parameter and cell the fit with the least
 // cross-validated variance, sums over terms weighed as the best split of the work would for all
-// parameters, among windows of 3, 5 and 9 cells and which of turn and score are used; none where
-// that does not halve what holding directions has over 9 by 9 cells, for this parameter and for the
-// sum over all of them. Deterministic on any number of threads.
+// parameters, among windows of 3, 5 and 9 cells; none where that does not halve what holding
+// directions has over 9 by 9 cells, for this parameter and for the sum over all of them.
+// Deterministic on any number of threads.
 FieldFit fit_fields(const PilotFigures& figures, int parameters, int threads);
 
 }  // namespace limn

@@ -2,7 +2,6 @@
 #include "integrators/pilot/pilot.h"
 
 #include <algorithm>
-#include <numeric>
 
 #include "integrators/pilot/probing_estimator.h"
 
@@ -17,8 +16,6 @@ class PilotEstimator final : public ProbingEstimator {
     for (size_t slot = 0; slot < terms.slots(); ++slot) {
       sums_.emplace_back(terms.adds_to_pixels(slot) ? grid_.size() : 0, terms.lanes());
     }
-    sums_.emplace_back(grid_.size(), terms.lanes());
-    later_lights_.resize(grid_.size());
     traced_.resize(grid_.size());
   }
 
@@ -32,9 +29,6 @@ class PilotEstimator final : public ProbingEstimator {
   double film_samples(size_t slot) const override { return terms_.film_samples(slot) * share(); }
 
   const PlanGrid& grid() const { return grid_; }
-  uint64_t later_lights() const {
-    return std::accumulate(later_lights_.begin(), later_lights_.end(), uint64_t{0});
-  }
   TracedDraws traced() const {
     TracedDraws sum;
     for (const TracedDraws& cell : traced_) sum.add(cell);
@@ -56,16 +50,13 @@ class PilotEstimator final : public ProbingEstimator {
     for (size_t slot = 0; slot < slots(); ++slot) {
       if (!sums_[slot].empty()) sums_[slot].add(cell, sample.terms[slot]);
     }
-    sums_.back().add(cell, sample.light_difference);
     traced_[cell].add(sample.traced);
-    later_lights_[cell] += static_cast<uint32_t>(sample.later_lights);
   }
 
   PlanGrid grid_;
   bool turns_;
   // Of every slot; a cell is written by the thread of its tile alone.
   mutable std::vector<CellSums> sums_;
-  mutable std::vector<uint32_t> later_lights_;
   mutable std::vector<TracedDraws> traced_;
 };
 
@@ -169,7 +160,6 @@ void PilotFigures::merge(const PilotFigures& more) {
     mix(first_work[slot], more.first_work[slot]);
     for (int k = 0; k < kLanes; ++k) mix(film_variance[slot][k], more.film_variance[slot][k]);
   }
-  mix(light_work, more.light_work);
   mix(seconds_of_work, more.seconds_of_work);
   traced.add(more.traced);
   spp = sum;
@@ -214,8 +204,6 @@ PilotFigures run_pilot(const TermEstimator& estimator, bool turns, PilotSamples 
   const double share = pilot.share();
   figures.traced = pilot.traced();
   run.add_work(spp, figures.grid.size(), watch.seconds() - began, figures);
-  figures.light_work = static_cast<double>(pilot.later_lights()) /
-                       (kPilotLights * static_cast<double>(spp) * figures.grid.size());
   for (size_t slot = 0; slot < estimator.slots(); ++slot) {
     figures.film_variance.push_back(
         estimator.film_samples(slot) > 0 ? run.film_variance(slot, share) : Lanes{});

@@ -15,14 +15,12 @@
 namespace limn {
 
 inline constexpr size_t kMostProbes = 65536;  // a film of 256 by 256 has them all; not tuned
-inline constexpr int kPilotLights = 2;        // light samples at later vertices
 
 struct PilotFigures {
   int spp = 0;  // samples of every probed pixel; 0: there was no time for a pilot
   PlanGrid grid;
   // [half][slot]: covariances of one sample, from either half of the pilot. Empty for slots that
-  // add nothing to pixels. Behind the slots stands one more: PathTracer::light_difference,
-  // which is half of what a light sample at later vertices adds, paths taking two of them.
+  // add nothing to pixels.
   std::array<std::vector<CellCovariances>, 2> halves;
   // Of slots on the film: the mean over pixels of the variance of one sample per pixel, summed over
   // channels, of each lane.
@@ -30,7 +28,6 @@ struct PilotFigures {
   // Of one sample of a slot, in every cell.
   std::vector<double> variances(size_t slot, int lane) const;
   TracedDraws traced;              // of edges at vertices
-  double light_work = 0;           // of one light sample at all later vertices of a path
   std::vector<double> work;        // of one sample of a pixel, of every slot, see Term::work
   std::vector<double> first_work;  // the same, see Term::first_work
   double seconds_of_work = 0;      // what a unit of work took; 0: there was no work

@@ -41,7 +41,6 @@ struct SamplePlan {
   SampleCounts uniform;
   PlanGrid grid;
   std::vector<PixelCounts> counts;     // by cell; empty: `uniform`
-  int light_samples = 1;               // at every vertex of a path but the first
   std::vector<DirectionField> fields;  // by cell; empty: directions are held
   std::vector<FilmMotion> film;        // by cell: positions on the film; empty: they are held
   // A draw of an edge that adds w times a radiance difference to its pixel, in luminance, is traced

@@ -252,7 +252,6 @@ TermEstimator::PathCosts TermEstimator::trace(std::span<const PathStart> places,
   using Tracer = PathTracer<Dual, Visitor>;
   Tracer tracer(traced_.context(), costs.rays);
   tracer.move_directions(rates_);
-  tracer.take_light_samples(plan_.light_samples);
   if (splits_now(twice)) tracer.split_by(&rates_);
   std::array<StartRay<Dual>, Tracer::kMostWalks> starts;
   std::array<LensPoint, Tracer::kMostWalks> lenses;
@@ -393,11 +392,7 @@ TermEstimator::Sample TermEstimator::sample(const PixelSample& at, const Rng& ke
     if (!turns) return TurnedSample{turning, {}, {}};
     return TurnedSample{twice ? resting : turning, turned(turning, resting), {}};
   };
-  const auto derivative = [](const Rgb<Dual>& x) { return Rgb<Lanes>{x.r.d, x.g.d, x.b.d}; };
-  Sample sample{value(path.found.radiance), {},     {},
-                path.found.later_lights,    traced, path.finite && (!twice || held.finite)};
-  sample.light_difference =
-      split(derivative(path.found.light_difference), derivative(held.found.light_difference));
+  Sample sample{value(path.found.radiance), {}, traced, path.finite && (!twice || held.finite)};
   for (size_t slot = 0; slot < terms_.size(); ++slot) {
     const Term* term = terms_[slot].get();
     if (!term) continue;

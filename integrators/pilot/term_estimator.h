@@ -67,13 +67,11 @@ class TermEstimator final : public SampleEstimator {
   struct Sample {
     Rgb<double> radiance;
     std::array<TurnedSample, kMostTerms> terms;  // of each slot; zero for those of the film
-    TurnedSample light_difference;               // see PathTracer
-    uint64_t later_lights;
     TracedDraws traced;
     bool finite;
   };
-  // Takes light_samples of the plan, which must be two for a light_difference. turns: whether turns
-  // of directions at the first vertex are looked at; the values are those of directions at rest.
+  // turns: whether turns of directions at the first vertex are looked at; the values are those of
+  // directions at rest.
   Sample sample(const PixelSample& at, const Rng& key, bool turns, SampleSink& sink) const;
 
   const Scene& scene() const override { return scene_; }

@@ -18,12 +18,11 @@ ValuePaths::ValuePaths(const PathContext& context, std::span<const Parameter> pa
       filter_(context.scene.film.filter),
       glossy_(is_glossy(context.scene)) {}
 
-void ValuePaths::trace(std::span<const KeyedSample> samples, int light_samples, RayCount& rays,
+void ValuePaths::trace(std::span<const KeyedSample> samples, RayCount& rays,
                        std::span<Found> found) const {
   PathTracer<Dual, Unmoved> tracer(context_, rays);
   tracer.colour_by(colours_);
   tracer.work_wide(glossy_);
-  tracer.take_light_samples(light_samples);
   const FilmRays starts(context_.scene, camera_, filter_, samples, false);
   std::vector<Walk<Dual, Unmoved>> walks;
   walks.reserve(samples.size());
@@ -40,7 +39,7 @@ void TermEstimator::add_values(std::span<const KeyedSample> samples, SampleSink&
   const auto finish = [&] {
     std::array<ValuePaths::Found, kMostTogether> found;
     PathCosts costs;
-    values_->trace(paths, plan_.light_samples, costs.rays, found);
+    values_->trace(paths, costs.rays, found);
     add_cost(costs, paths.size(), sink.cost(pixel_slot_));
     for (size_t i = 0; i < paths.size(); ++i) {
       PathSums<Dual> sums;

@@ -22,8 +22,7 @@ class ValuePaths {
     bool failed;  // it needed a ray that cannot be traced
   };
   // found[i]: by the path of samples[i]; at most kMostTogether.
-  void trace(std::span<const KeyedSample> samples, int light_samples, RayCount& rays,
-             std::span<Found> found) const;
+  void trace(std::span<const KeyedSample> samples, RayCount& rays, std::span<Found> found) const;
 
  private:
   const PathContext& context_;

@@ -233,14 +233,6 @@ TEST(SpreadSamples, AreEvenWhereNothingVaries) {
   EXPECT_LE(product(plan.counts[0][0], plan.counts[0][1]), 1.1 * product(1, 3));
 }
 
-TEST(LightSamples, AreAsManyAsPay) {
-  // sqrt of (16 / 1) / (1 / 1)
-  EXPECT_EQ(best_light_samples(1, 1, {16, 1}), 4);
-  EXPECT_EQ(best_light_samples(1, 1, {0.5, 1}), 1);
-  EXPECT_EQ(best_light_samples(1, 1, {0, 1}), 1);
-  EXPECT_EQ(best_light_samples(1, 10, {100, 1}), 8);
-}
-
 // Indices of the terms of scenes without sharp shadows.
 enum Term { kInterior, kCamera, kBoundary };
 

@@ -340,8 +340,7 @@ TEST(LiftedPoints, GrazingLightHasAllItsShadows) {
   EXPECT_NEAR(sum.mean(0), differences.mean(0), 3.5 * error);
 }
 
-// Light in closed form, and lines and regions of the sky, from where paths start, too: the sums of
-// images agree.
+// Light in closed form, and lines, from where paths start, too: the sums of images agree.
 TEST(LiftedPoints, MethodsShareAnImage) {
   const TempFiles files;
   for (const std::string kind : {"waves", "back", "ball"}) {
