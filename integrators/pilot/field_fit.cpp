@@ -1,8 +1,8 @@
 // Control variates' coefficients: least squares over windows of cells, chosen by cross-validation.
 #include "integrators/pilot/field_fit.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 
@@ -12,7 +12,7 @@
 namespace limn {
 namespace {
 
-using Coefficients = Eigen::Matrix<double, kUnknowns, 1>;
+using Coefficients = std::array<double, kUnknowns>;
 
 constexpr int kRadii[] = {1, 2, 4};
 constexpr int kHeld = -1;
@@ -63,29 +63,41 @@ struct Prior {
   }
 };
 
-// Least squares, for any of the parameters.
+// Least squares, for any of the parameters: A x = b by A = L D L^T.
 class Fit {
  public:
   Fit(const Covariances& c, const Prior& prior) : c_(c) {
     const double size = prior.size_of(c);
-    Eigen::Matrix<double, kUnknowns, kUnknowns> a;
-    for (int i = 0; i < kUnknowns; ++i) {
-      for (int j = 0; j < kUnknowns; ++j) a(i, j) = c.of(i, j);
-      a(i, i) = (1 + kRidge) * a(i, i) + kLeast * size * prior.unknowns[i];
+    for (int j = 0; j < kUnknowns; ++j) {
+      for (int i = j; i < kUnknowns; ++i) {
+        double rest = c.of(i, j);
+        if (i == j) rest = (1 + kRidge) * rest + kLeast * size * prior.unknowns[i];
+        for (int k = 0; k < j; ++k) rest -= lower_[i][k] * lower_[j][k] * diagonal_[k];
+        if (i == j) diagonal_[j] = rest;
+        // An unknown that was not seen has no coefficient.
+        lower_[i][j] = diagonal_[j] > 0 ? rest / diagonal_[j] : 0;
+      }
     }
-    solver_.compute(a);
   }
   Coefficients of(int parameter) const {
-    Coefficients b;
-    for (int i = 0; i < kUnknowns; ++i) b[i] = -c_.with(parameter, i);
-    const Coefficients solved = solver_.solve(b);
-    if (!solved.allFinite()) return Coefficients::Zero();
-    return solved;
+    Coefficients x;
+    for (int i = 0; i < kUnknowns; ++i) {
+      x[i] = -c_.with(parameter, i);
+      for (int k = 0; k < i; ++k) x[i] -= lower_[i][k] * x[k];
+    }
+    bool finite = true;
+    for (int i = kUnknowns - 1; i >= 0; --i) {
+      x[i] = diagonal_[i] > 0 ? x[i] / diagonal_[i] : 0;
+      for (int k = i + 1; k < kUnknowns; ++k) x[i] -= lower_[k][i] * x[k];
+      finite = finite && std::isfinite(x[i]);
+    }
+    return finite ? x : Coefficients{};
   }
 
  private:
   Covariances c_;
-  Eigen::LDLT<Eigen::Matrix<double, kUnknowns, kUnknowns>> solver_;
+  double lower_[kUnknowns][kUnknowns] = {};  // below the diagonal
+  double diagonal_[kUnknowns] = {};
 };
 
 // Sums of n numbers.
@@ -311,7 +323,7 @@ class Fitter {
         if (figures_.in_cells(slot)) result.variances[k][slot].resize(grid_.size());
       }
       for (size_t cell = 0; cell < grid_.size(); ++cell) {
-        set(k, cell, Coefficients::Zero(), Coefficients::Zero());
+        set(k, cell, Coefficients{}, Coefficients{});
       }
     }
     for_fits(chosen, [&](int k, size_t cell, const Coefficients& first, const Coefficients& second,
