@@ -25,33 +25,50 @@ RadianceColumns::RadianceColumns(const Environment& environment, int threads)
   require_memory({}, static_cast<double>(grid_.columns) * stride_ * sizeof(Cell),
                  "the sums over the environment's map", "use a smaller map, or another method");
   cells_.resize(grid_.columns * stride_);
+  std::vector<double> cosines, sines;
   for (int j = 0; j < rows; ++j) {
     const double theta = step_ * j;
-    at_rows_.push_back(moments(theta, std::cos(theta), std::sin(theta)));
+    cosines.push_back(std::cos(theta)), sines.push_back(std::sin(theta));
+    at_rows_.push_back(moments(theta, cosines[j], sines[j]));
   }
-  parallel_for(grid_.columns, threads, [&](size_t i) {
-    Cell* column = &cells_[i * stride_];
+  std::vector<Vec3d> around;
+  for (int i = 0; i < grid_.columns; ++i) around.push_back(azimuth(i));
+  // Texels of some columns in a row share a line of the cache.
+  constexpr int kTogether = 8;
+  parallel_for((grid_.columns + kTogether - 1) / kTogether, threads, [&](size_t block) {
+    const int first = static_cast<int>(block) * kTogether;
+    const int last = std::min(first + kTogether, grid_.columns);
     for (int j = 0; j < rows; ++j) {
-      const Rgb<double> radiance = environment.radiance(direction(static_cast<int>(i), j));
-      column[j].texel = Colour{radiance.r, radiance.g, radiance.b, 0};
+      for (int i = first; i < last; ++i) {
+        const Vec3d w = grid_.pole * cosines[j] + around[i] * sines[j];
+        const Rgb<double> radiance =
+            environment.radiance_at(w, {static_cast<double>(i), static_cast<double>(j)});
+        cells_[i * stride_ + j].texel = Colour{radiance.r, radiance.g, radiance.b, 0};
+      }
     }
-    for (int j = 0; j + 1 < rows; ++j) {
-      const InRow w = in_row(j, at_rows_[j + 1]);
-      const Cell &here = column[j], &below = column[j + 1];
-      column[j + 1].pole = here.pole + here.texel * w.pole_here + below.texel * w.pole_below;
-      column[j + 1].across =
-          here.across + here.texel * w.across_here + below.texel * w.across_below;
-    }
+    for (int i = first; i < last; ++i) add_up(&cells_[i * stride_]);
   });
+}
+
+void RadianceColumns::add_up(Cell* column) const {
+  for (int j = 0; j + 1 < grid_.rows; ++j) {
+    const InRow w = in_row(j, at_rows_[j + 1]);
+    const Cell &here = column[j], &below = column[j + 1];
+    column[j + 1].pole = here.pole + here.texel * w.pole_here + below.texel * w.pole_below;
+    column[j + 1].across = here.across + here.texel * w.across_here + below.texel * w.across_below;
+  }
+}
+
+Vec3d RadianceColumns::azimuth(int column) const {
+  const double phi = 2 * kPi * (column + 0.5) / grid_.columns;
+  return grid_.zero * std::cos(phi) + grid_.quarter * std::sin(phi);
 }
 
 // At the poles radiance depends on the azimuth of approach: it is taken from a direction next to
 // it.
 Vec3d RadianceColumns::direction(int column, int row) const {
-  const double phi = 2 * kPi * (column + 0.5) / grid_.columns;
   const double theta = std::clamp(step_ * row, 1e-7, kPi - 1e-7);
-  const Vec3d r = grid_.zero * std::cos(phi) + grid_.quarter * std::sin(phi);
-  return grid_.pole * std::cos(theta) + r * std::sin(theta);
+  return grid_.pole * std::cos(theta) + azimuth(column) * std::sin(theta);
 }
 
 // Between two rows radiance is here + (below - here) (theta - step row) / step.

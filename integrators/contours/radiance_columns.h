@@ -64,6 +64,8 @@ class RadianceColumns {
     double pole_here, pole_below, across_here, across_below;
   };
   InRow in_row(int row, const Moments& end) const;
+  void add_up(Cell* column) const;  // from its texels
+  Vec3d azimuth(int column) const;
   Vec3d direction(int column, int row) const;
 
   Environment::Grid grid_;

@@ -5,6 +5,7 @@
 
 #include <bit>
 
+#include "integrators/estimates/checksum.h"
 #include "integrators/estimates/shared_place.h"
 #include "limn/integrators/differences.h"
 #include "limn/integrators/gradient.h"
@@ -84,6 +85,14 @@ TEST_P(Threads, SameBits) {
 }
 
 INSTANTIATE_TEST_SUITE_P(, Threads, testing::Values(2, 7));
+
+// What zlib's crc32 gives, for whole blocks of eight bytes and for rests.
+TEST(Runs, ChecksumsAreCrc32) {
+  EXPECT_EQ(checksum(""), 0u);
+  EXPECT_EQ(checksum("12345678"), 0x9ae0daafu);
+  EXPECT_EQ(checksum("123456789"), 0xcbf43926u);
+  EXPECT_EQ(checksum("The quick brown fox jumps over the lazy dog"), 0x414fa339u);
+}
 
 // Of one to seventeen streams at once: to the bit what each gives by itself.
 TEST(Numbers, DrawnAtOnceAreThoseOfTheStreams) {
