@@ -413,9 +413,7 @@ class Unifier {
         n.motion_group = kNoMotionGroup;
         continue;
       }
-      const auto same = [&](const Neighbour* motion_group) {
-        return moves_alike(n, *motion_group);
-      };
+      const auto same = [&](const Neighbour* first) { return moves_alike(n, *first); };
       const auto found = std::find_if(motion_groups.begin(), motion_groups.end(), same);
       n.motion_group = static_cast<uint8_t>(
           std::min<size_t>(found - motion_groups.begin(), kMostMotionGroups - 1));

@@ -213,33 +213,6 @@ std::unique_ptr<RejectionTree> EdgeForest::rejection_tree() const {
   return make_forest_rejection_tree(impl_->forest);
 }
 
-uint64_t EdgeForest::list_silhouettes(const Vec3d& p, std::vector<EdgeRef>& edges) const {
-  const Forest& forest = impl_->forest;
-  const ForestPoint point = point_of(forest, p);
-  std::vector<NodeId> stack(forest.roots.rbegin(), forest.roots.rend());
-  uint64_t tested = 0;
-  while (!stack.empty()) {
-    const NodeId id = stack.back();
-    stack.pop_back();
-    ++tested;
-    if (id >= 0) {
-      const InnerNode& node = forest.inner[id];
-      const Ints alive = may_hold_candidates(node, point);
-      for (int lane = kWidth - 1; lane >= 0; --lane)
-        if (alive[lane]) stack.push_back(node.child[lane]);
-      continue;
-    }
-    const EdgeNode& node = forest.edges[~id];
-    const Ints alive = may_hold_candidates(node, point);
-    for (int lane = 0; lane < kWidth; ++lane) {
-      if (!alive[lane]) continue;
-      const EdgeRef edge = node.edge_at(lane);
-      if (is_candidate(impl_->input.object(edge.object), edge.edge, p)) edges.push_back(edge);
-    }
-  }
-  return tested;
-}
-
 bool EdgeForest::list_outlines(const EdgeQuery& query, const DirectionCone& directions,
                                std::vector<ListedEdge>& edges) const {
   const Forest& forest = impl_->forest;

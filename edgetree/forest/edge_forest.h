@@ -35,10 +35,6 @@ class EdgeForest final : public EdgeSampler {
   SamplerSize size() const override;
   std::unique_ptr<RejectionTree> rejection_tree() const override;
 
-  // Appends all of E(p), ignoring occlusion, horizon and motion, in tree order. Returns the number
-  // of tested nodes (of up to eight children).
-  uint64_t list_silhouettes(const Vec3d& p, std::vector<EdgeRef>& edges) const;
-
  private:
   struct Impl;
   explicit EdgeForest(std::unique_ptr<Impl> impl);

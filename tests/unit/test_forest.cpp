@@ -16,18 +16,23 @@
 #include "edgetree/forest/forest_build.h"
 #include "edgetree/forest/forest_query.h"
 #include "limn/edgetree/contribution_bound.h"
+#include "limn/edgetree/rejection.h"
 #include "support/edge_mesh_fault.h"
 
 namespace limn {
 namespace {
 
+// All of E(p) that descents can reach.
+std::vector<EdgeRef> silhouettes_of(const EdgeForest& forest, const EdgeSamplerInput& input,
+                                    const Vec3d& p) {
+  return reach_from(input, *forest.rejection_tree(), p).silhouettes;
+}
+
 void expect_complete(const EdgeSamplerInput& input, const EdgeForest& forest, const Vec3d& p,
                      const std::string& name) {
-  std::vector<EdgeRef> listed;
-  forest.list_silhouettes(p, listed);
   std::vector<std::vector<bool>> found;
   for (const EdgeMesh& mesh : input.objects) found.emplace_back(mesh.edges.size(), false);
-  for (EdgeRef id : listed) {
+  for (EdgeRef id : silhouettes_of(forest, input, p)) {
     EXPECT_FALSE(found[id.object.index()][id.edge.index()]) << name << ": listed twice";
     found[id.object.index()][id.edge.index()] = true;
   }
@@ -218,9 +223,7 @@ TEST(Forest, DoesNotDependOnThreads) {
   const auto one = EdgeForest::build(input, 1), seven = EdgeForest::build(input, 7);
   for (int i = 0; i < 20; ++i) {
     const Vec3d p = random_direction(rng) * 3.0;
-    std::vector<EdgeRef> a, b;
-    EXPECT_EQ(one->list_silhouettes(p, a), seven->list_silhouettes(p, b));
-    EXPECT_EQ(a, b);
+    EXPECT_EQ(silhouettes_of(*one, input, p), silhouettes_of(*seven, input, p));
   }
 }
 
@@ -324,12 +327,10 @@ TEST(Forest, QueriesKeepThePointToTwiceAFloat) {
 // Sum over edges of w^2 / P, w their exact weights: the second moment of a draw.
 double second_moment(const EdgeForest& forest, const EdgeSamplerInput& input,
                      const EdgeQuery& query, double& mean) {
-  std::vector<EdgeRef> edges;
-  forest.list_silhouettes(query.p, edges);
   const LtcLobe lobe(query.lobe, query.n, query.wi);
   double moment = 0;
   mean = 0;
-  for (const EdgeRef id : edges) {
+  for (const EdgeRef id : silhouettes_of(forest, input, query.p)) {
     const EdgeSegment segment = segment_of(input.object(id.object), id.edge, query);
     const Vec3d side = cross(segment.w_0, segment.w_1);
     double speed = 0;

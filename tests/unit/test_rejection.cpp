@@ -349,23 +349,6 @@ TEST(RejectionTree, BoxesOfPlanesAreTight) {
   }
 }
 
-TEST(RejectionTree, OfTheForestReachesWhatItLists) {
-  Rng rng(32, 0, 0);
-  const EdgeSamplerInput input{{build_edge_mesh(with_smooth_normals(torus_mesh(30, 20)), true)}};
-  const auto forest = EdgeForest::build(input, 1);
-  const auto tree = forest->rejection_tree();
-  for (int i = 0; i < 30; ++i) {
-    const Vec3d p = random_direction(rng) * 2.0;
-    std::vector<EdgeRef> listed;
-    forest->list_silhouettes(p, listed);
-    std::vector<EdgeRef> reached = reach_from(input, *tree, p).silhouettes;
-    const auto before = [](EdgeRef a, EdgeRef b) { return a.edge < b.edge; };
-    std::sort(listed.begin(), listed.end(), before);
-    std::sort(reached.begin(), reached.end(), before);
-    EXPECT_EQ(listed, reached);
-  }
-}
-
 TEST(ReachCounts, AreSumsOverPoints) {
   const EdgeSamplerInput input{{build_edge_mesh(with_smooth_normals(torus_mesh(20, 10)), true)}};
   const auto sampler = make_edge_sampler("li2019", input, 1);
