@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "integrators/compare/check_step.h"
+#include "integrators/methods/move_rounding.h"
 #include "limn/core/parameter.h"
 #include "limn/integrators/check.h"
 #include "limn/integrators/options.h"

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "integrators/compare/edge_events.h"
+#include "integrators/methods/move_rounding.h"
 #include "limn/core/error.h"
 #include "limn/core/moved.h"
 #include "limn/core/parameter.h"
@@ -32,42 +33,6 @@ constexpr int kPilotPart = 8;     // of the samples of the run
 constexpr double kAllowedBias = 1;
 // Var(4 D_h - D_2h) / 9 over Var(D_h) for events at moving edges: those that h sees, 2h sees too.
 constexpr double kExtrapolated = 12.5 / 9;
-
-// Below this part of a moved coordinate, a vertex moves by what rounding leaves of its way: an
-// error of kRounding of it.
-constexpr double kLeastMove = 0x1p-14, kRounding = 0x1p-10;
-
-// The same of texels, where the fastest decide: radiance is linear in them, so that a step too
-// large for others does no harm.
-double least_texel_step(const Scene& scene, const Parameter& parameter) {
-  const Image velocities = parameter.texel_velocities(scene);
-  if (velocities.data.empty()) return 0;
-  const Image texels = parameter.texel_map(scene)->texels();
-  double moving = 0, speed = 0;
-  for (size_t i = 0; i < velocities.data.size(); ++i) {
-    const double v = std::fabs(double{velocities.data[i]});
-    moving = std::max(moving, v * std::fabs(double{texels.data[i]}));
-    speed = std::max(speed, v);
-  }
-  return speed > 0 ? kLeastMove * moving / (speed * speed) : 0;
-}
-
-// The least step that floats resolve; 0 if neither vertices nor texels move.
-double least_step(const Scene& scene, const Parameter& parameter) {
-  double place = 0, speed = 0;
-  for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
-    const std::vector<Vec3d> velocities = parameter.velocities(scene, ShapeId(s));
-    for (size_t v = 0; v < velocities.size(); ++v) {
-      const Vec3f& x = scene.shapes[s].mesh.positions[v];
-      for (int c = 0; c < 3; ++c) {
-        if (velocities[v][c] == 0) continue;
-        place = std::max(place, std::fabs(static_cast<double>(x[c])));
-        speed = std::max(speed, std::fabs(velocities[v][c]));
-      }
-    }
-  }
-  return speed > 0 ? kLeastMove * place / speed : least_texel_step(scene, parameter);
-}
 
 // The differences at every step of a ladder, and what changes from each to the next.
 std::vector<std::vector<double>> steps_and_changes(size_t steps) {
@@ -152,8 +117,6 @@ double step_for_ratio(double step, double ratio) {
   return step * std::pow(kAllowedBias / ratio, 0.4);
 }
 
-double power_of_two_below(double step) { return std::exp2(std::floor(std::log2(step))); }
-
 // The step that a ladder finds, and whether a lower ladder may know better.
 struct Found {
   double step;
@@ -234,10 +197,6 @@ std::optional<Scene> with_texels_inside(const Scene& scene, const Parameter& par
   Scene copy = parameter.moved(scene, 0);
   parameter.texel_map(copy)->set_texels(texels);
   return copy;
-}
-
-double rounding_of_moves(const Scene& scene, const Parameter& parameter, double step) {
-  return kRounding * least_step(scene, parameter) / step;
 }
 
 double reduced_step(const DifferenceResult& differences, double step, const Windows& windows) {

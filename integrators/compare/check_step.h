@@ -27,8 +27,4 @@ double reduced_step(const DifferenceResult& differences, double step, const Wind
 std::optional<Scene> with_texels_inside(const Scene& scene, const Parameter& parameter,
                                         double step);
 
-// The error that rounding moved positions and texels to float causes in differences at a step,
-// over the derivative: about 2^-24 of what moves over its way. 0 if none of these moves.
-double rounding_of_moves(const Scene& scene, const Parameter& parameter, double step);
-
 }  // namespace limn

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "integrators/methods/method_table.h"
+#include "integrators/methods/move_rounding.h"
 #include "limn/core/parameter.h"
 #include "limn/integrators/differences.h"
 #include "limn/integrators/statistics.h"
@@ -21,6 +22,8 @@ constexpr int kPilotSamples = 4;     // per pixel, at least: variances need some
 // lot. Not tuned.
 constexpr int kTrials = 5;
 constexpr double kFactor = 4;
+// The share of its way by which rounding may change what moves. Not tuned.
+constexpr double kMostRounding = 1.0 / 64;
 
 struct Step {
   double value = 0;
@@ -49,14 +52,24 @@ Change squared_change(const Moments& change) {
 }
 
 // The differences at every step, and what changes from each to the next.
-std::vector<std::vector<double>> steps_and_changes() {
-  std::vector<std::vector<double>> combinations(2 * kTrials - 1, std::vector<double>(kTrials));
-  for (int k = 0; k < kTrials; ++k) combinations[k][k] = 1;
-  for (int k = 0; k + 1 < kTrials; ++k) {
-    combinations[kTrials + k][k] = -1;
-    combinations[kTrials + k][k + 1] = 1;
+std::vector<std::vector<double>> steps_and_changes(size_t steps) {
+  std::vector<std::vector<double>> combinations(2 * steps - 1, std::vector<double>(steps));
+  for (size_t k = 0; k < steps; ++k) combinations[k][k] = 1;
+  for (size_t k = 0; k + 1 < steps; ++k) {
+    combinations[steps + k][k] = -1;
+    combinations[steps + k][k + 1] = 1;
   }
   return combinations;
+}
+
+// What the pilot tries: steps at which floats move as they should.
+std::vector<double> steps_to_try(const Scene& scene, const Parameter& parameter) {
+  std::vector<double> steps;
+  for (int k = kTrials - 1; k >= 0; --k) {
+    const double step = parameter.natural_step * std::pow(kFactor, -k);
+    if (rounding_of_moves(scene, parameter, step) <= kMostRounding) steps.push_back(step);
+  }
+  return steps;
 }
 
 // Looks for a step for one parameter out of `parameters`, which share the time. seconds: of the
@@ -73,32 +86,45 @@ Step find_step(const Scene& scene, const Parameter& parameter, size_t parameters
   }
   settings.least_spp = kPilotSamples;
   settings.seed = run.seed + 1;  // not the samples that the run will take
-  DifferenceJob job{parameter.name, {}, steps_and_changes()};
-  for (int k = kTrials - 1; k >= 0; --k) {
-    job.steps.push_back(parameter.natural_step * std::pow(kFactor, -k));
-  }
+  DifferenceJob job{parameter.name, steps_to_try(scene, parameter), {}};
+  const size_t count = job.steps.size();
+  // Floats hold positions that move by a power of two where they hold any.
+  if (count < 2) return {power_of_two_below(parameter.natural_step), "what floats resolve"};
+  job.combinations = steps_and_changes(count);
   const CentralDifferences r = central_differences(scene, {job}, 0, settings, true);
   seconds += r.seconds;
   if (r.spp < kPilotSamples) return {parameter.natural_step, "interrupted"};
   std::vector<StepTrial> trials;
-  for (int k = 0; k < kTrials; ++k) {
-    const Change change = squared_change(r.estimates[0][kTrials + std::max(k - 1, 0)].total);
+  for (size_t k = 0; k < count; ++k) {
+    const size_t next = count + std::max<size_t>(k, 1) - 1;
+    const Change change = squared_change(r.estimates[0][next].total);
     trials.push_back({job.steps[k],
                       mean_variance(r.estimates[0][k].total) * static_cast<double>(r.spp),
                       change.squared, change.error});
   }
   extrapolate_variances(trials);
-  // A run makes two images a sample and parameter, the pilot 2 kTrials.
+  // A run makes two images a sample and parameter, the pilot two for every step.
+  const auto steps = static_cast<double>(count);
   const double per_second =
-      kTrials * static_cast<double>(r.spp) / std::max(r.seconds - r.setup_seconds, 1e-9);
-  const double left = (run.seconds - r.setup_seconds / kTrials) / parameters - r.seconds;
+      steps * static_cast<double>(r.spp) / std::max(r.seconds - r.setup_seconds, 1e-9);
+  const double left = (run.seconds - r.setup_seconds / steps) / parameters - r.seconds;
   const double samples =
       run.seconds > 0 ? samples_behind_pilot(per_second, left, run.least_spp) : run.spp;
   return {
       best_step(trials, samples),
       fmt::format("a pilot of {} spp at {} steps from {:.3g} to {:.3g}: least sum of squared bias "
                   "and variance for a run of {:.3g} spp",
-                  r.spp, kTrials, job.steps.front(), job.steps.back(), samples)};
+                  r.spp, count, job.steps.front(), job.steps.back(), samples)};
+}
+
+void warn_of_rounding(const Scene& scene, const Parameter& parameter, double step,
+                      std::vector<std::string>& warnings) {
+  const double rounding = rounding_of_moves(scene, parameter, step);
+  if (rounding <= kMostRounding) return;
+  warnings.push_back(fmt::format(
+      "finite differences of \"{}\" may be off by {:.2g} %: what a step of {:.3g} moves is rounded "
+      "to float; a larger step, or a scene closer to the origin, lowers it",
+      parameter.name, 100 * rounding, step));
 }
 
 ParameterGradient to_gradient(const std::string& name, DifferenceEstimate& estimate) {
@@ -129,6 +155,7 @@ GradientResult run_differences(const MethodType& method, const Scene& scene,
                           ? Step{options.step, "the user"}
                           : find_step(scene, parameter, parameters.size(), settings, pilot_seconds);
     jobs.push_back({parameter.name, {step.value}, {{1}}});
+    warn_of_rounding(scene, parameter, step.value, result.warnings);
     const std::string of = parameters.size() > 1 ? " of " + parameter.name : "";
     result.settings.push_back({"step" + of, step.value});
     result.settings.push_back({"step" + of + " found by", step.found_by});

@@ -369,11 +369,14 @@ TEST(Choice, GivesTheBitsOfARunWithTheseSamples) {
   expect_same(chosen, run(scene, {"ball.translate.x"}, chosen.samples(), run_settings(32)));
 
   RunSettings limited = run_settings(1 << 30, 2);
-  limited.seconds = 0.3;
-  const GradientResult timed = run(scene, {"ball.translate.x"}, {}, limited);
-  EXPECT_GE(timed.spp, 1);
-  expect_same(timed, run(scene, {"ball.translate.x"}, timed.samples(),
-                         run_settings(static_cast<int>(timed.spp))));
+  limited.least_spp = 4;  // two batches however late it is, for variances
+  for (const double seconds : {0.3, 1e-9}) {
+    limited.seconds = seconds;
+    const GradientResult timed = run(scene, {"ball.translate.x"}, {}, limited);
+    EXPECT_GE(timed.spp, 4);
+    expect_same(timed, run(scene, {"ball.translate.x"}, timed.samples(),
+                           run_settings(static_cast<int>(timed.spp))));
+  }
 }
 
 TEST(Choice, IsLeftWhenInterrupted) {

@@ -144,27 +144,43 @@ TEST(Depth, LimitAndRouletteAgree) {
 }
 
 // All positions are multiples of 1/64, which floats hold at either place.
+Scene scene_at(const TempFiles& files, const Vec3d& offset) {
+  SceneParts parts;
+  parts.origin = Vec3d{0.5, 1.75, 3.5} + offset;
+  parts.target = Vec3d{0, 0.5, 0} + offset;
+  parts.body =
+      square("floor", 3, -90, offset, diffuse("chalk", "0.75, 0.75, 0.75")) +
+      obj_shape("cube", write_mesh(files, "cube.obj", cube_mesh()), true, 0.5,
+                Vec3d{0.25, 0.75, 0} + offset, diffuse("clay", "0.7, 0.5, 0.3")) +
+      square("lamp", 0.5, 90, Vec3d{0.25, 2.5, 0.5} + offset, area_light("glow", "6, 5, 4"));
+  return make_scene(files, parts);
+}
+
 TEST(Place, DoesNotMatter) {
   const TempFiles files;
-  const auto scene_at = [&](const Vec3d& offset) {
-    SceneParts parts;
-    parts.origin = Vec3d{0.5, 1.75, 3.5} + offset;
-    parts.target = Vec3d{0, 0.5, 0} + offset;
-    parts.body =
-        square("floor", 3, -90, offset, diffuse("chalk", "0.75, 0.75, 0.75")) +
-        obj_shape("cube", write_mesh(files, "cube.obj", cube_mesh()), true, 0.5,
-                  Vec3d{0.25, 0.75, 0} + offset, diffuse("clay", "0.7, 0.5, 0.3")) +
-        square("lamp", 0.5, 90, Vec3d{0.25, 2.5, 0.5} + offset, area_light("glow", "6, 5, 4"));
-    return make_scene(files, parts);
-  };
   const std::vector<std::string> parameters = {"cube.translate.x", "glow.radiance"};
-  const GradientResult here = run_blocks(scene_at({0, 0, 0}), parameters, 256, 1);
+  const GradientResult here = run_blocks(scene_at(files, {0, 0, 0}), parameters, 256, 1);
   for (const double distance : {100.0, 1e5}) {
     const Vec3d offset = Vec3d{1, 1, 1} * distance;
-    const GradientResult there = run_blocks(scene_at(offset), parameters, 256, 2);
+    const GradientResult there = run_blocks(scene_at(files, offset), parameters, 256, 2);
     for (size_t k = 0; k < parameters.size(); ++k)
       expect_equal(here.parameters[k], there.parameters[k]);
   }
+}
+
+// Where floats are coarser than small steps, differences take one that they hold.
+TEST(Place, DoesNotMatterToDifferences) {
+  const TempFiles files;
+  GradientOptions options;
+  options.method = "fd";
+  options.parameters = {"cube.translate.x"};
+  const GradientResult here = run_blocks(scene_at(files, {0, 0, 0}), options.parameters, 256, 1);
+  EXPECT_TRUE(here.warnings.empty());
+  const GradientResult there = run_blocks(scene_at(files, {1e5, 1e5, 1e5}), options, 2048, 2);
+  expect_equal(here.parameters[0], there.parameters[0]);
+  ASSERT_EQ(there.warnings.size(), 1u);
+  EXPECT_NE(there.warnings[0].find("finite differences of \"cube.translate.x\" may be off by"),
+            std::string::npos);
 }
 
 // What lies beyond the far plane is not behind an edge either.

@@ -1,0 +1,18 @@
+#pragma once
+// What rounding moved positions and texels to float does to differences.
+#include "limn/core/parameter.h"
+#include "limn/core/scene.h"
+
+namespace limn {
+
+// The least step that floats resolve, with an error of 2^-10 of the way; 0 if neither vertices nor
+// texels move.
+double least_step(const Scene& scene, const Parameter& parameter);
+
+// The error that rounding causes in differences at a step, over the derivative: about 2^-24 of what
+// moves over its way. 0 if none of these moves.
+double rounding_of_moves(const Scene& scene, const Parameter& parameter, double step);
+
+double power_of_two_below(double step);
+
+}  // namespace limn
