@@ -8,6 +8,7 @@
 #include "integrators/methods/blurred_estimator.h"
 #include "integrators/methods/drawn_alike.h"
 #include "integrators/methods/radiance_estimator.h"
+#include "limn/core/environment_map.h"
 #include "limn/core/exposure.h"
 #include "limn/core/moved.h"
 #include "limn/core/parameter.h"
@@ -35,8 +36,8 @@ std::vector<double> mean_of_two(const std::vector<double>& a, const std::vector<
   return mean;
 }
 
-// Appends the scene moved by each step of a job, forwards and back. Where only materials change
-// these draw the same directions.
+// Appends the scene moved by each step of a job, forwards and back. Where only materials or the
+// environment change these draw the same directions.
 void append_moved(const Scene& scene, const DifferenceJob& job, std::vector<Scene>& moved) {
   const Parameter parameter = find_parameter(scene, job.parameter);
   const size_t first = moved.size();
@@ -44,6 +45,9 @@ void append_moved(const Scene& scene, const DifferenceJob& job, std::vector<Scen
     for (const double h : {step, -step}) moved.push_back(parameter.moved(scene, h));
   }
   if (moved_by({&parameter, 1}).any()) return;
+  for (size_t i = first; scene.environment && i < moved.size(); ++i) {
+    moved[i].environment = drawn_alike(moved[i].environment, *scene.environment);
+  }
   const auto largest = std::max_element(job.steps.begin(), job.steps.end());
   const size_t farthest = 2 * (largest - job.steps.begin());
   draw_alike(std::span(moved).subspan(first), farthest, farthest + 1);

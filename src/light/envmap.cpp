@@ -15,6 +15,7 @@ class MapEnvironment final : public Environment {
   MapEnvironment(std::shared_ptr<const EnvironmentMap> map, const Vec3d axes[3], double scale,
                  std::string file)
       : map_(std::move(map)),
+        drawn_by_(map_),
         axes_{axes[0], axes[1], axes[2]},
         scale_(scale),
         file_(std::move(file)) {}
@@ -29,7 +30,7 @@ class MapEnvironment final : public Environment {
   void sample_directions(std::span<const Numbers> u, std::span<Drawn> drawn) const override;
   double pdf_solid_angle(const Vec3d& d) const override {
     const Vec3d v = map_from_world(d);
-    return map_->pdf_solid_angle(map_->locate(v), v);
+    return drawn_by_->pdf_solid_angle(map_->locate(v), v);
   }
   std::array<double, 2> find(const Vec3d& d) const override {
     const auto place = map_->locate(map_from_world(d));
@@ -60,7 +61,7 @@ class MapEnvironment final : public Environment {
   Map map() const override { return {map_->width(), map_->height(), map_->mean_magnitude()}; }
   Image texels() const override { return map_->texels(); }
   void set_texels(const Image& texels) override {
-    map_ = std::make_shared<EnvironmentMap>(texels);
+    map_ = drawn_by_ = std::make_shared<EnvironmentMap>(texels);
     if (!file_.ends_with(kChanged)) file_ += kChanged;
   }
   void add_texel_tangents(const Image& velocity, int lane) override {
@@ -80,6 +81,11 @@ class MapEnvironment final : public Environment {
   }
   std::shared_ptr<Environment> clone() const override {
     return std::make_shared<MapEnvironment>(*this);
+  }
+  std::shared_ptr<Environment> drawn_by(const MapEnvironment& other) const {
+    const auto copy = std::make_shared<MapEnvironment>(*this);
+    copy->drawn_by_ = other.drawn_by_;
+    return copy;
   }
   std::string describe() const override {
     return fmt::format("envmap, {} ({} x {}), scale {:g}", file_, map_->width(), map_->height(),
@@ -111,7 +117,7 @@ class MapEnvironment final : public Environment {
             Sight<S>& sight) const {
     DCHECK(is_place(d, {place.x, place.y}));
     sight.radiance = map_->radiance(place) * scale;
-    sight.pdf = map_->pdf_solid_angle(place, map_from_world(d));
+    sight.pdf = drawn_by_->pdf_solid_angle(place, map_from_world(d));
   }
   // Up to rounding.
   [[maybe_unused]] bool is_place(const Vec3d& d, const std::array<double, 2>& place) const {
@@ -127,7 +133,8 @@ class MapEnvironment final : public Environment {
   }
 
   std::shared_ptr<const EnvironmentMap> map_;
-  Vec3d axes_[3];  // the map's axes in world space
+  std::shared_ptr<const EnvironmentMap> drawn_by_;  // has the density of directions
+  Vec3d axes_[3];                                   // the map's axes in world space
   Dual scale_;
   std::string file_;
   bool texels_move_ = false;
@@ -139,7 +146,7 @@ void MapEnvironment::sample_directions(std::span<const Numbers> u, std::span<Dra
     const auto number = [&](int k) {
       return wide::gather([&](int i) { return u[std::min(first + i, last - 1)][k]; });
     };
-    const EnvironmentMap::Drawn map = map_->sample(number(0), number(1));
+    const EnvironmentMap::Drawn map = drawn_by_->sample(number(0), number(1));
     const wide::Vec& v = map.direction;
     const wide::Vec w = axes_[0] * v.x + axes_[1] * v.y + axes_[2] * v.z;
     for (size_t i = first; i < last; ++i) {
@@ -170,6 +177,12 @@ std::shared_ptr<Environment> make_map_environment(const Image& image, double sca
   const Vec3d axes[3] = {{c, 0, -s}, {0, 1, 0}, {s, 0, c}};
   return std::make_shared<MapEnvironment>(std::make_shared<EnvironmentMap>(image), axes, scale,
                                           file);
+}
+
+std::shared_ptr<Environment> drawn_alike(const std::shared_ptr<Environment>& moved,
+                                         const Environment& unmoved) {
+  const auto* map = dynamic_cast<const MapEnvironment*>(moved.get());
+  return map ? map->drawn_by(dynamic_cast<const MapEnvironment&>(unmoved)) : moved;
 }
 
 void read_envmap(Properties& properties, Scene& scene, Shape*) {

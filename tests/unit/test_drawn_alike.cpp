@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "limn/core/bsdf.h"
+#include "limn/core/environment_map.h"
 #include "limn/core/parameter.h"
 #include "limn/core/rng.h"
 #include "limn/core/surface_point.h"
@@ -139,6 +140,29 @@ TEST(DrawnAlike, LeavesTheNoiseOfTheDerivative) {
   const DifferenceResult d = finite_differences(scene, "paint.alpha", 0.002, 0, settings);
   const Moments& sum = g.parameters[0].image_sum;
   EXPECT_LT(d.at_step.image_sum.variance(0), 4 * sum.variance(0));
+}
+
+// An image is linear in the texels of a sky, and so is what the same paths see: its differences are
+// the same over any step, but for the rounding of texels to floats.
+TEST(DrawnAlike, SkiesWhoseTexelsMoveAreSampledAlike) {
+  const TempFiles files;
+  Scene scene = scene_of(files, kMetal);
+  Image sky(8, 4, 3);
+  for (size_t i = 0; i < sky.data.size(); ++i) sky.data[i] = static_cast<float>(i % 7);
+  scene.environment = make_map_environment(sky, 1, 0, "sky.exr");
+  scene.environment_id = "sky";
+  RunSettings settings;
+  settings.spp = 64;
+  constexpr double kStep = 0.002;
+  const DifferenceResult d = finite_differences(scene, "sky.data.1.0.g", kStep, 0, settings);
+  const double sum = d.at_step.image_sum.mean(0), wide = d.at_double_step.image_sum.mean(0);
+  ASSERT_EQ(sky.at(0, 1, 1), 4);
+  EXPECT_NEAR(sum / wide, 1, 1.5 * 0x1p-22 / kStep);
+  GradientOptions options;
+  options.parameters = {"sky.data.1.0.g"};
+  const Moments exact = gradient(scene, options, settings).parameters[0].image_sum;
+  const double error = std::sqrt(d.at_step.image_sum.variance(0) + exact.variance(0));
+  EXPECT_LT(std::fabs(sum - exact.mean(0)), 4 * error);
 }
 
 }  // namespace
