@@ -364,5 +364,27 @@ TEST(RoughBoundary, InnerReflectanceOfSmoothOnesHasTheSlopeOfFresnels) {
   }
 }
 
+// The critical angle crosses nodes of a quadrature as roughness and index move: differences over
+// small steps are slopes all the same, to the resolution of the cosines.
+TEST(RoughBoundary, InnerReflectanceMovesWithoutSteps) {
+  using microfacet::Distribution;
+  constexpr double kEta = 1.49, kStep = 1e-4;
+  for (const auto distribution : {Distribution::kBeckmann, Distribution::kGgx}) {
+    for (const double alpha : {0.1, 0.25}) {
+      const auto at = [&](double a, double eta) {
+        return RoughBoundary(distribution, a, eta).inner_reflectance(a, eta);
+      };
+      const Dual slopes =
+          RoughBoundary(distribution, alpha, kEta)
+              .inner_reflectance(Dual(alpha, {1, 0, 0, 0}), Dual(kEta, {0, 1, 0, 0}));
+      const double da = kStep * alpha;
+      const double by_alpha = (at(alpha + da, kEta) - at(alpha - da, kEta)) / (2 * da);
+      const double by_eta = (at(alpha, kEta + kStep) - at(alpha, kEta - kStep)) / (2 * kStep);
+      EXPECT_NEAR(slopes.d.lane[0] / by_alpha, 1, 2.0 / 63) << alpha;
+      EXPECT_NEAR(slopes.d.lane[1] / by_eta, 1, 2.0 / 63) << alpha;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace limn
