@@ -16,7 +16,7 @@ struct IntegratorType {
   const char* name;
   int max_depth = -1;                       // if absent
   bool is_depth_fixed = false;              // max_depth cannot be given
-  bool passes_null = false;                 // goes straight through masks where limn does not
+  bool passes_null = false;                 // volumetric, see check_null
   bool is_wrapper = false;                  // its first nested integrator decides
   std::vector<std::string> ignored = {};    // parameters that change no expectation
   std::vector<std::string> unwritten = {};  // parameters that ask for images that limn lacks
@@ -53,14 +53,42 @@ int depth(Properties& p, const std::string& name, int absent, int least, const c
   return static_cast<int>(read);
 }
 
-void check_no_null(const ObjectDescription& object, const std::string& integrator) {
-  static const std::vector<std::string> kNull = {"mask", "null", "thindielectric"};
-  if (object.tag == "bsdf" && std::find(kNull.begin(), kNull.end(), object.type) != kNull.end()) {
-    throw InputError(object.where,
-                     "bsdf \"" + object.type + "\": " + integrator +
-                         " passes it where path does not: change the integrator to path");
+const ObjectDescription* find_type(const ObjectDescription& object, const std::string& tag,
+                                   const std::vector<std::string>& types) {
+  if (object.tag == tag && std::ranges::find(types, object.type) != types.end()) return &object;
+  for (const ChildDescription& child : object.children) {
+    if (const ObjectDescription* found = find_type(*child.object, tag, types)) return found;
   }
-  for (const ChildDescription& child : object.children) check_no_null(*child.object, integrator);
+  return nullptr;
+}
+const ObjectDescription* find_type(const SceneDescription& description, const std::string& tag,
+                                   const std::vector<std::string>& types) {
+  for (const auto& root : description.objects) {
+    if (const ObjectDescription* found = find_type(*root, tag, types)) return found;
+  }
+  return nullptr;
+}
+
+// Volumetric integrators go straight through masks also towards lights, and count no bounce there.
+// Paths go through by chance and then count a light that they meet fully, so the expectation is the
+// same: without a limit of bounces, and but for lights that no path meets.
+void check_null(const SceneDescription& description, const std::string& integrator, int max_depth) {
+  const auto* null = find_type(description, "bsdf", {"mask", "null", "thindielectric"});
+  if (!null) return;
+  const auto fail = [&](const std::string& what) {
+    throw InputError(null->where, "bsdf \"" + null->type + "\": " + integrator + what);
+  };
+  if (max_depth >= 0) {
+    fail(
+        " counts no bounce there, and path does: set max_depth to -1, or change the integrator to "
+        "path");
+  }
+  const auto* light =
+      find_type(description, "emitter", {"directional", "point", "projector", "spot"});
+  if (light) {
+    fail(" lets light of a " + light->type +
+         " pass it, and path does not: change the integrator to path");
+  }
 }
 
 }  // namespace
@@ -97,8 +125,7 @@ void read_integrator(const ObjectDescription& object, const SceneDescription& de
   scene.hide_emitters = p.boolean("hide_emitters", false);
   for (const std::string& name : type->ignored) p.has(name);
   p.check_all_used();
-  if (!type->passes_null) return;
-  for (const auto& root : description.objects) check_no_null(*root, object.type);
+  if (type->passes_null) check_null(description, object.type, scene.max_depth);
 }
 
 }  // namespace limn

@@ -52,9 +52,17 @@ TEST(OtherScenes, IntegratorsThatEstimateTheSame) {
   EXPECT_EQ(warnings, std::vector<std::string>{"string:2:24: warning: aovs are not written"});
 }
 
-TEST(OtherScenes, VolpathWithoutWhatItPasses) {
-  EXPECT_NE(message_of("<integrator type=\"volpath\"/><bsdf id=\"a\" type=\"mask\"/>")
-                .find("bsdf \"mask\": volpath passes it where path does not"),
+// Where both have the same expectation.
+TEST(OtherScenes, VolpathWithWhatItPasses) {
+  const std::string net = "<bsdf id=\"a\" type=\"mask\"><bsdf type=\"diffuse\"/></bsdf>";
+  const std::string lamp = "<emitter type=\"point\"/>";
+  EXPECT_EQ(read("<integrator type=\"volpath\"/>" + net).max_depth, -1);
+  EXPECT_EQ(read("<integrator type=\"prbvolpath\"/>" + lamp).max_depth, 6);
+  EXPECT_NE(message_of("<integrator type=\"prbvolpath\"/>" + net)
+                .find("bsdf \"mask\": prbvolpath counts no bounce there"),
+            std::string::npos);
+  EXPECT_NE(message_of("<integrator type=\"volpath\"/>" + net + lamp)
+                .find("bsdf \"mask\": volpath lets light of a point pass it"),
             std::string::npos);
 }
 
