@@ -279,8 +279,7 @@ bool Fit::Impl::add_view(size_t view, FitRecord& record,
   backward_options.batches = 1;
   backward_options.find_gaps = false;  // reported before the first step
   if (is_exact()) backward_options.uniform_pixels = true;
-  // Those of the fit: what shapes turn about is taken along by its translations, and does not
-  // wander.
+  // Those of the fit: displacements are along the normals of its start.
   backward_options.found.clear();
   for (const FitParameter& p : parameters_) {
     if (p.in_view(view)) backward_options.found.push_back(*p.in_view(view));
@@ -304,16 +303,6 @@ bool Fit::Impl::add_view(size_t view, FitRecord& record,
     for (size_t k = 0; k < m.size(); ++k) gradients[i][k] += m.mean(k);
   }
   return true;
-}
-
-void Fit::Impl::carry(const FitParameter& moved) {
-  for (size_t v = 0; v < views.size(); ++v) {
-    const ShapeId shape = moved.shape(v);
-    if (!shape.valid()) continue;
-    ShapePose pose;
-    for (const FitParameter& p : parameters_) p.add_to_pose(pose, v, shape);
-    for (FitParameter& p : parameters_) p.follow(pose, v, shape);
-  }
 }
 
 bool Fit::Impl::evaluate(FitRecord& record, std::vector<std::vector<double>>& gradients) {
@@ -340,7 +329,6 @@ std::optional<FitRecord> Fit::Impl::step() {
   for (size_t i = 0; i < parameters_.size(); ++i) {
     record.halvings = std::max(record.halvings,
                                parameters_[i].move(gradients[i], record.step_size, steps, views));
-    carry(parameters_[i]);
   }
   finish_step(record);
   record.seconds = watch.seconds();
@@ -390,11 +378,15 @@ FitState Fit::Impl::state() const {
   for (const FitParameter& p : parameters_) state.parameters.push_back(p.state());
   for (size_t v = 0; v < views.size(); ++v) {
     const Scene& scene = views[v].scene;
-    FitState::View view{
-        camera_numbers(scene.camera), {}, {}, course_numbers(scene, moved_shapes(v)), {}};
+    FitState::View view{camera_numbers(scene.camera),           {}, {}, {},
+                        course_numbers(scene, moved_shapes(v)), {}};
     for (const ShapeId s : moved_shapes(v)) {
       const Mesh& mesh = scene.shape(s).mesh;
       view.shapes.push_back({mesh.positions, mesh.normals, mesh.faces});
+      view.pivots.emplace_back();
+      if (const std::optional<Pivot>& p = scene.shape(s).pivot) {
+        view.pivots.back() = {p->center.x, p->center.y, p->center.z, p->size};
+      }
     }
     for (const FitParameter& p : parameters_) view.values.push_back(values_in(v, p));
     for (const TexelMap* map : texel_maps(v)) {
@@ -429,7 +421,9 @@ void Fit::Impl::check_state(const FitState& state) const {
     const FitState::View& view = state.views[v];
     const std::vector<ShapeId> shapes = moved_shapes(v);
     check(view.camera.size() == 15 && view.shapes.size() == shapes.size() &&
-          view.values.size() == parameters_.size());
+          view.pivots.size() == shapes.size() && view.values.size() == parameters_.size());
+    for (const auto& pivot : view.pivots)
+      check(pivot.empty() || (pivot.size() == 4 && pivot[3] != 0));
     check(view.courses.size() == course_numbers(views[v].scene, shapes).size());
     for (size_t i = 0; i < parameters_.size(); ++i) {
       check(view.values[i].size() == values_in(v, parameters_[i]).size());
@@ -480,6 +474,11 @@ void Fit::Impl::put(const FitState& state) {
       mesh.positions = shape.positions;
       mesh.normals = shape.normals;
       update_shading_normals(mesh);
+      std::optional<Pivot>& pivot = scene.shapes[shapes[i].index()].pivot;
+      pivot.reset();
+      if (const std::vector<double>& p = view.pivots[i]; !p.empty()) {
+        pivot = {{p[0], p[1], p[2]}, p[3]};
+      }
     }
     for (size_t i = 0; i < parameters_.size(); ++i) {
       if (!view.values[i].empty()) parameters_[i].in_view(v)->assign(scene, view.values[i]);
@@ -502,7 +501,6 @@ void Fit::Impl::put(const FitState& state) {
   for (size_t i = 0; i < parameters_.size(); ++i) {
     parameters_[i].restore(state.parameters[i], views, remeshed[i]);
   }
-  for (const FitParameter& p : parameters_) carry(p);
   quasi_newton_.steps = state.moves;
   quasi_newton_.changes = state.changes;
   here_.reset();

@@ -74,8 +74,6 @@ class Fit::Impl {
   bool add_view(size_t view, FitRecord& record, std::vector<std::vector<double>>& gradients);
   // Loss and gradients of all views; false: interrupted.
   bool evaluate(FitRecord& record, std::vector<std::vector<double>>& gradients);
-  // After a step of one parameter: what its shape turns about and is scaled about goes along.
-  void carry(const FitParameter& moved);
   void finish_step(FitRecord& record);
 
   // Of kLbfgs, in fit_quasi_newton.cpp.

@@ -60,7 +60,7 @@ FitParameter::FitParameter(const std::string& name, const std::vector<FitView>& 
     }
   }
   if (first_view_ == views.size()) throw UnknownParameter(*unknown);
-  natural_step_ = in_view_[first_view_]->natural_step;
+  natural_step_ = natural_step_in(views[first_view_].scene);
   const size_t dimensions = in_view_[first_view_]->array.size();
   if (dimensions == 1 || dimensions == 2) {
     find_array(views, options.smoothing);
@@ -72,6 +72,17 @@ FitParameter::FitParameter(const std::string& name, const std::vector<FitView>& 
   // few paths meet have noise alone, which a scale of their own would make as large as any step.
   const bool alone = !is_array() && !is_map() && options.optimiser == OptimiserKind::kAdamUniform;
   optimiser_.emplace(alone ? OptimiserKind::kAdam : options.optimiser, numbers_.size());
+}
+
+// A rotation moves its farthest vertex as far as a translation does.
+double FitParameter::natural_step_in(const Scene& scene) const {
+  const Parameter& parameter = *in_view_[first_view_];
+  const ShapeId shape = shapes_[first_view_];
+  if (!shape.valid() || !parameter.array.empty()) return parameter.natural_step;
+  double fastest = 0;
+  for (const Vec3d& v : parameter.velocities(scene, shape)) fastest = std::max(fastest, length(v));
+  const double diagonal = bounds_of(scene.shape(shape).mesh).diagonal();
+  return fastest > 0 ? 0.01 * diagonal / fastest : parameter.natural_step;
 }
 
 void FitParameter::find_in_views(const std::vector<FitView>& views) {
@@ -199,17 +210,6 @@ void FitParameter::add_to_numbers(std::vector<double>& step, std::vector<FitView
   for (size_t k = 0; k < step.size(); ++k) {
     numbers_[k] = has_values ? numbers_[k] + step[k] : bounded_sum(numbers_[k], step[k]);
   }
-}
-
-void FitParameter::add_to_pose(ShapePose& pose, size_t view, ShapeId shape) const {
-  if (shapes_[view] != shape || numbers_.size() != 1) return;
-  const ShapePose each = in_view_[view]->pose_per_unit(shape);
-  pose.moved += each.moved * numbers_[0];
-  pose.grown += each.grown * numbers_[0];
-}
-
-void FitParameter::follow(const ShapePose& pose, size_t view, ShapeId shape) {
-  if (shapes_[view] == shape) in_view_[view] = in_view_[view]->at(pose);
 }
 
 // Sums round: a value next to its bound must not pass it, and one that was stopped is there.

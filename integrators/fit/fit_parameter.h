@@ -48,11 +48,6 @@ class FitParameter {
   // but `step` is changed, if a face would lose its area or grow together with another.
   bool add(std::vector<double>& step, std::vector<FitView>& views);
 
-  // Adds what its steps so far have done to a shape of that view as a whole.
-  void add_to_pose(ShapePose& pose, size_t view, ShapeId shape) const;
-  // From now on it moves that shape from there.
-  void follow(const ShapePose& pose, size_t view, ShapeId shape);
-
   // One, or the three channels of a colour; none of an array or a map.
   std::vector<FitScalar> scalars(const std::vector<FitView>& views) const;
   FitState::Numbers state() const;
@@ -67,6 +62,7 @@ class FitParameter {
   const Mesh& mesh(const std::vector<FitView>& views) const {
     return views[first_view_].scene.shape(shapes_[first_view_]).mesh;
   }
+  double natural_step_in(const Scene& scene) const;  // of the first view
   // Once more, after the mesh has changed.
   void find_in_views(const std::vector<FitView>& views);
   void find_array(const std::vector<FitView>& views, double smoothing);

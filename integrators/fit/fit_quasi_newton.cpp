@@ -102,7 +102,6 @@ std::optional<std::vector<double>> Fit::Impl::advance(const std::vector<double>&
     for (double& x : step) x *= length;
     try {
       if (!p.add(step, views)) return std::nullopt;
-      carry(p);
     } catch (const InputError&) {  // the step is too long for what is moved
       return std::nullopt;
     }

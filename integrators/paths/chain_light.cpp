@@ -124,7 +124,7 @@ std::string missing_by_chains(const PathContext& context, const Scene& scene,
   const size_t more = light.shapes.size() - names.size();
   return fmt::format(
       "the derivative is not complete: edges seen by way of smooth lobes of {}{} are missing; "
-      "{:.2g} % of the image's light comes that way (smooth_as of 0.003 makes them rough){}",
+      "{:.3g} % of the image's light comes that way (smooth_as of 0.003 makes them rough){}",
       join(names), more > 0 ? fmt::format(" and {} more", more) : "", 100 * light.share,
       of_flat_mirrors(context, scene));
 }

@@ -285,17 +285,17 @@ GEARS = [11, -9, 12, -12, 8, 10, -11, 16, -18, 17, -15, 18, -17, 17, -16]
 
 def tree(_):
     return Function("tree_shadow", ["object.rotate.y"], [TREE], {
-        "lbfgs": (8, f"{NEWTON} --step 5"),
-        "adam": (45, f"{FUNCTION} --optimiser adam --step 3 --step-half-life 12"),
-        "adam of forest": (60, "--spp 16 --step 3 --step-half-life 25 --seed 1"),
+        "lbfgs": (8, f"{NEWTON} --step 1.4"),
+        "adam": (45, f"{FUNCTION} --optimiser adam --step 0.9 --step-half-life 12"),
+        "adam of forest": (60, "--spp 16 --step 0.9 --step-half-life 25 --seed 1"),
     }, target=[f"turn={TREE}"])
 
 
 def gears(_):
     return Function("gears", [f"gear_{i}.rotate.y" for i in range(len(GEARS))], [-a for a in GEARS], {
-        "lbfgs": (28, f"{NEWTON} --step 5"),
-        "adam": (80, f"{FUNCTION} --optimiser adam --step 4 --step-half-life 20"),
-        "adam of forest": (80, "--spp 16 --step 4 --step-half-life 20 --seed 1"),
+        "lbfgs": (28, f"{NEWTON} --step 1.8"),
+        "adam": (80, f"{FUNCTION} --optimiser adam --step 1.4 --step-half-life 20"),
+        "adam of forest": (80, "--spp 16 --step 1.4 --step-half-life 20 --seed 1"),
     }, start=[f"off_{i}={a}" for i, a in enumerate(GEARS)])
 
 

@@ -30,10 +30,6 @@ class Motion {
   virtual std::shared_ptr<const Motion> held(const Scene&) const { return nullptr; }
   // As in Parameter.
   virtual std::vector<Vec3d> directions(const Scene&) const { return {}; }
-  // As in Parameter.
-  virtual ShapePose pose_per_unit(ShapeId /*shape*/) const { return {}; }
-  // This motion for a shape in another pose; null if it is unchanged.
-  virtual std::shared_ptr<const Motion> at(const ShapePose&) const { return nullptr; }
 
   // The component of an array or colour named by the suffix `rest` (":FILE", ".7.x", ".r"). Nothing
   // for an unknown suffix; InputError for an invalid one.

@@ -138,14 +138,6 @@ std::vector<Vec3d> Parameter::directions(const Scene& scene) const {
   return motion->directions(scene);
 }
 
-ShapePose Parameter::pose_per_unit(ShapeId shape) const { return motion->pose_per_unit(shape); }
-
-Parameter Parameter::at(const ShapePose& pose) const {
-  Parameter there = *this;
-  if (auto moved = motion->at(pose)) there.motion = std::move(moved);
-  return there;
-}
-
 TexelMap* Parameter::texel_map(Scene& scene) const { return motion->texel_map(scene); }
 
 const TexelMap* Parameter::texel_map(const Scene& scene) const {

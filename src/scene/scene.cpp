@@ -114,6 +114,7 @@ void set_mesh(Scene& scene, ShapeId shape, std::vector<Vec3f> positions,
                      "a new mesh has no texture coordinates, which the material of "
                      "this shape needs");
   }
+  changed.pivot.reset();
   changed.mesh =
       make_mesh(std::move(positions), std::move(faces),
                 changed.mesh.normal_source == NormalSource::kFace, changed.where, warnings);

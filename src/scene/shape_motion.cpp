@@ -32,37 +32,35 @@ class ShapeMotion : public Motion {
   Moved moved() const final { return {.vertices = true}; }
   void seed(Scene& scene, int lane, size_t component) const final {
     Mesh& mesh = scene.shapes[shape_.index()].mesh;
-    add_to_lane(mesh.position_tangents, lane, vertex_velocities(mesh, component));
+    add_to_lane(mesh.position_tangents, lane, vertex_velocities(scene.shape(shape_), component));
     if (mesh.normal_source == NormalSource::kGiven) seed_given_normals(mesh, lane);
     update_shading_tangents(mesh);
-    const Vec3d shift = own_pose_per_unit().moved;
+    const Vec3d shift = shift_per_unit();
     if (Course* course = course_of(scene, shift)) {
       for (int k = 0; k < 3; ++k) course->shift[k][lane] += shift[k];
     }
   }
   void move(Scene& scene, double step, size_t component) const final {
-    Mesh& mesh = scene.shapes[shape_.index()].mesh;
-    move_vertices(mesh, step, component);
-    update_shading_normals(mesh);
-    const Vec3d shift = own_pose_per_unit().moved;
+    Shape& shape = scene.shapes[shape_.index()];
+    move_vertices(shape, step, component);
+    update_shading_normals(shape.mesh);
+    const Vec3d shift = shift_per_unit();
     if (Course* course = course_of(scene, shift)) course->translate(shift * step);
   }
   std::vector<Vec3d> velocities(const Scene& scene, ShapeId shape, size_t component) const final {
     if (shape != shape_) return {};
-    return vertex_velocities(scene.shape(shape_).mesh, component);
-  }
-  ShapePose pose_per_unit(ShapeId shape) const final {
-    return shape == shape_ ? own_pose_per_unit() : ShapePose{};
+    return vertex_velocities(scene.shape(shape_), component);
   }
 
  protected:
-  virtual ShapePose own_pose_per_unit() const { return {}; }
-  virtual std::vector<Vec3d> vertex_velocities(const Mesh& mesh, size_t component) const = 0;
+  virtual Vec3d shift_per_unit() const { return {}; }
+  virtual std::vector<Vec3d> vertex_velocities(const Shape& shape, size_t component) const = 0;
   virtual void seed_given_normals(Mesh&, int /*lane*/) const {}
-  virtual void move_vertices(Mesh& mesh, double step, size_t component) const {
-    const std::vector<Vec3d> velocities = vertex_velocities(mesh, component);
-    for (size_t i = 0; i < mesh.positions.size(); ++i) {
-      mesh.positions[i] = cast<float>(cast<double>(mesh.positions[i]) + velocities[i] * step);
+  virtual void move_vertices(Shape& shape, double step, size_t component) const {
+    const std::vector<Vec3d> velocities = vertex_velocities(shape, component);
+    std::vector<Vec3f>& positions = shape.mesh.positions;
+    for (size_t i = 0; i < positions.size(); ++i) {
+      positions[i] = cast<float>(cast<double>(positions[i]) + velocities[i] * step);
     }
   }
 
@@ -78,40 +76,38 @@ class ShapeMotion : public Motion {
 
 class ShapeTranslation final : public ShapeMotion {
  public:
-  ShapeTranslation(ShapeId shape, int axis) : ShapeMotion(shape), axis_(axis) {}
+  ShapeTranslation(ShapeId shape, int axis, const Pivot& start)
+      : ShapeMotion(shape), axis_(axis), start_(start) {}
 
  protected:
-  std::vector<Vec3d> vertex_velocities(const Mesh& mesh, size_t) const override {
-    return std::vector<Vec3d>(mesh.positions.size(), unit_vector(axis_));
+  std::vector<Vec3d> vertex_velocities(const Shape& shape, size_t) const override {
+    return std::vector<Vec3d>(shape.mesh.positions.size(), unit_vector(axis_));
   }
-  ShapePose own_pose_per_unit() const override { return {unit_vector(axis_), 0}; }
+  Vec3d shift_per_unit() const override { return unit_vector(axis_); }
+  void move_vertices(Shape& shape, double step, size_t component) const override {
+    ShapeMotion::move_vertices(shape, step, component);
+    shape.pivot = shape.pivot.value_or(start_);
+    shape.pivot->center += shift_per_unit() * step;
+  }
 
  private:
   int axis_;
+  Pivot start_;  // of shapes that have none yet
 };
 
-// Rotation about a pivot that only translations move, so that steps add up. The center of a shape's
-// bounds would change as it rotates.
+// Rotation about the shape's pivot: the center of a shape's bounds would change as it rotates.
 class ShapeRotation final : public ShapeMotion {
  public:
-  // center: initially; pose: the motion since.
-  ShapeRotation(ShapeId shape, int axis, const Vec3d& center, const ShapePose& pose = {})
-      : ShapeMotion(shape),
-        shape_(shape),
-        axis_(axis),
-        start_(center),
-        center_(center + pose.moved) {}
-
-  std::shared_ptr<const Motion> at(const ShapePose& pose) const override {
-    return std::make_shared<ShapeRotation>(shape_, axis_, start_, pose);
-  }
+  ShapeRotation(ShapeId shape, int axis, const Pivot& start)
+      : ShapeMotion(shape), axis_(axis), start_(start) {}
 
  protected:
-  std::vector<Vec3d> vertex_velocities(const Mesh& mesh, size_t) const override {
+  std::vector<Vec3d> vertex_velocities(const Shape& shape, size_t) const override {
+    const Vec3d center = shape.pivot.value_or(start_).center;
     std::vector<Vec3d> velocities;
-    velocities.reserve(mesh.positions.size());
-    for (const Vec3f& p : mesh.positions) {
-      velocities.push_back(cross(unit_vector(axis_), cast<double>(p) - center_));
+    velocities.reserve(shape.mesh.positions.size());
+    for (const Vec3f& p : shape.mesh.positions) {
+      velocities.push_back(cross(unit_vector(axis_), cast<double>(p) - center));
     }
     return velocities;
   }
@@ -120,48 +116,44 @@ class ShapeRotation final : public ShapeMotion {
     for (const Vec3d& n : mesh.normals) turns.push_back(cross(unit_vector(axis_), n));
     add_to_lane(mesh.normal_tangents, lane, turns);
   }
-  void move_vertices(Mesh& mesh, double step, size_t) const override {
-    for (Vec3f& p : mesh.positions) {
-      p = cast<float>(center_ + turned(cast<double>(p) - center_, axis_, step));
+  void move_vertices(Shape& shape, double step, size_t) const override {
+    shape.pivot = shape.pivot.value_or(start_);
+    const Vec3d center = shape.pivot->center;
+    for (Vec3f& p : shape.mesh.positions) {
+      p = cast<float>(center + turned(cast<double>(p) - center, axis_, step));
     }
-    if (mesh.normal_source != NormalSource::kGiven) return;
-    for (Vec3d& n : mesh.normals) n = turned(n, axis_, step);
+    if (shape.mesh.normal_source != NormalSource::kGiven) return;
+    for (Vec3d& n : shape.mesh.normals) n = turned(n, axis_, step);
   }
 
  private:
-  ShapeId shape_;
   int axis_;
-  Vec3d start_, center_;
+  Pivot start_;
 };
 
 // Scaling about the same pivot, in units of the initial size.
 class ShapeScaling final : public ShapeMotion {
  public:
-  // center: initially; pose: the motion since.
-  ShapeScaling(ShapeId shape, const Vec3d& center, const ShapePose& pose = {})
-      : ShapeMotion(shape),
-        shape_(shape),
-        start_(center),
-        center_(center + pose.moved),
-        size_(1 + pose.grown) {}
-
-  std::shared_ptr<const Motion> at(const ShapePose& pose) const override {
-    return std::make_shared<ShapeScaling>(shape_, start_, pose);
-  }
+  ShapeScaling(ShapeId shape, const Pivot& start) : ShapeMotion(shape), start_(start) {}
 
  protected:
-  std::vector<Vec3d> vertex_velocities(const Mesh& mesh, size_t) const override {
+  std::vector<Vec3d> vertex_velocities(const Shape& shape, size_t) const override {
+    const Pivot pivot = shape.pivot.value_or(start_);
     std::vector<Vec3d> velocities;
-    velocities.reserve(mesh.positions.size());
-    for (const Vec3f& p : mesh.positions) velocities.push_back((cast<double>(p) - center_) / size_);
+    velocities.reserve(shape.mesh.positions.size());
+    for (const Vec3f& p : shape.mesh.positions) {
+      velocities.push_back((cast<double>(p) - pivot.center) / pivot.size);
+    }
     return velocities;
   }
-  ShapePose own_pose_per_unit() const override { return {{}, 1}; }
+  void move_vertices(Shape& shape, double step, size_t component) const override {
+    ShapeMotion::move_vertices(shape, step, component);
+    shape.pivot = shape.pivot.value_or(start_);
+    shape.pivot->size += step;
+  }
 
  private:
-  ShapeId shape_;
-  Vec3d start_, center_;
-  double size_;
+  Pivot start_;
 };
 
 class VertexField final : public ShapeMotion {
@@ -170,8 +162,8 @@ class VertexField final : public ShapeMotion {
       : ShapeMotion(shape), field_(std::move(field)) {}
 
  protected:
-  std::vector<Vec3d> vertex_velocities(const Mesh& mesh, size_t) const override {
-    CHECK_EQ(mesh.positions.size(), field_.size());
+  std::vector<Vec3d> vertex_velocities(const Shape& shape, size_t) const override {
+    CHECK_EQ(shape.mesh.positions.size(), field_.size());
     return field_;
   }
 
@@ -225,21 +217,23 @@ class VertexArray final : public ShapeMotion {
   }
   void assign(Scene& scene, const std::string& name, const std::vector<double>& value,
               std::vector<std::string>* warnings) const override {
-    Mesh& mesh = scene.shapes[shape_.index()].mesh;
-    check_numbers(scene, name, value, 3 * mesh.positions.size(), -kLargestCoordinate,
+    Shape& shape = scene.shapes[shape_.index()];
+    check_numbers(scene, name, value, 3 * shape.mesh.positions.size(), -kLargestCoordinate,
                   kLargestCoordinate);
     std::vector<Vec3f> positions;
     for (size_t i = 0; i < value.size(); i += 3) {
       positions.push_back(cast<float>(Vec3d{value[i], value[i + 1], value[i + 2]}));
     }
-    mesh = moved_mesh(mesh, std::move(positions), scene.shape(shape_).where, warnings);
+    shape.mesh = moved_mesh(shape.mesh, std::move(positions), shape.where, warnings);
+    shape.pivot.reset();
   }
   std::string parts(const std::string& name) const override {
     return "\"" + name + ":FILE\" for a field of vectors, \"" + name + ".0.x\" for one number";
   }
 
  protected:
-  std::vector<Vec3d> vertex_velocities(const Mesh& mesh, size_t component) const override {
+  std::vector<Vec3d> vertex_velocities(const Shape& shape, size_t component) const override {
+    const Mesh& mesh = shape.mesh;
     std::vector<Vec3d> velocities(mesh.positions.size());
     const uint32_t root = mesh.weld[component / 3];
     for (size_t i = root; i < velocities.size(); ++i) {
@@ -299,7 +293,8 @@ class VertexDisplacement final : public ShapeMotion {
   }
 
  protected:
-  std::vector<Vec3d> vertex_velocities(const Mesh& mesh, size_t component) const override {
+  std::vector<Vec3d> vertex_velocities(const Shape& shape, size_t component) const override {
+    const Mesh& mesh = shape.mesh;
     std::vector<Vec3d> velocities = of(mesh);
     for (size_t i = 0; i < velocities.size(); ++i) {
       if (mesh.weld[i] != mesh.weld[component]) velocities[i] = {};
@@ -334,15 +329,16 @@ void add_shape_parameters(const Scene& scene, std::vector<Parameter>& list) {
     if (shape.id.empty()) continue;
     const Bounds bounds = bounds_of(shape.mesh);
     const double step = 0.01 * bounds.diagonal();
+    const Pivot pivot = shape.pivot.value_or(Pivot{bounds.center()});
     for (int axis = 0; axis < 3; ++axis) {
       const std::string end(1, "xyz"[axis]);
       list.push_back({shape.id + ".translate." + end, "scene units", step, 1,
-                      std::make_shared<ShapeTranslation>(id, axis)});
+                      std::make_shared<ShapeTranslation>(id, axis, pivot)});
       list.push_back({shape.id + ".rotate." + end, "radians", 0.01, 1,
-                      std::make_shared<ShapeRotation>(id, axis, bounds.center())});
+                      std::make_shared<ShapeRotation>(id, axis, pivot)});
     }
-    list.push_back({shape.id + ".scale", "factor", 0.01, 1,
-                    std::make_shared<ShapeScaling>(id, bounds.center())});
+    list.push_back(
+        {shape.id + ".scale", "factor", 0.01, 1, std::make_shared<ShapeScaling>(id, pivot)});
     list.back().least = kLeastScale - 1;
     list.push_back({shape.id + ".vertex_positions", "scene units", step,
                     3 * shape.mesh.positions.size(), std::make_shared<VertexArray>(id)});

@@ -139,6 +139,42 @@ def test_meshes_are_arrays(folder, tmp_path):
             assert same(limn.render(scene).value, limn.render(read[2]).value)
 
 
+def test_meshes_take_attributes(folder):
+    square = {"type": "mesh", "vertices": [[-1, 0, 0], [1, 0, 0], [1, 2, 0], [-1, 2, 0]],
+              "faces": [[0, 1, 2], [0, 2, 3]]}
+    colours = np.array([[0.1, 0.2, 0.3]] * 4)
+
+    def image_of(reflectance, **attributes):
+        scene = limn.load_dict({**scene_dict(), "roof": {
+            **square, **attributes, "bsdf": {"type": "diffuse", "reflectance": reflectance}}}, folder)
+        return scene, limn.render(scene, seed=3).value
+
+    scene, image = image_of({"type": "mesh_attribute", "name": "vertex_color"}, vertex_color=colours)
+    np.testing.assert_allclose(image, image_of({"type": "rgb", "value": [0.1, 0.2, 0.3]})[1],
+                               rtol=1e-5)
+    assert scene.parameters["roof.vertex_color"].shape == (1, 4, 3)
+    # What is nearest to the corner (0, 0) of the texture coordinates, of every point.
+    texture = {"type": "bitmap", "bitmap": np.array([[[.5, .2, .1], [.9, .9, .9]]]), "raw": True,
+               "filter_type": "nearest"}
+    corner = image_of(texture, vertex_texcoords=np.full((4, 2), 0.1))[1]
+    np.testing.assert_allclose(corner, image_of({"type": "rgb", "value": [.5, .2, .1]})[1], rtol=1e-5)
+    # Normals of the file in place of the plane's.
+    plane = {"type": "rgb", "value": [0.5, 0.5, 0.5]}
+    tilted = image_of(plane, vertex_normals=np.tile([0, 0.6, 0.8], (4, 1)))[1]
+    assert not np.allclose(tilted, image_of(plane)[1], rtol=1e-2)
+
+
+def test_later_messages_name_the_dictionary(folder):
+    scene = limn.load_dict(scene_dict(), str(folder))
+    assert scene.file == "dict"
+    for call, text in ((lambda: scene["ball.rotate"], r"^dict: error: unknown parameter"),
+                       (lambda: scene.set_mesh("ball", np.eye(3), [[0, 1, 3]]),
+                        r"^dict\.ball: error: face 0")):
+        with pytest.raises(limn.InputError) as error:
+            call()
+        assert re.match(text, str(error.value)), str(error.value)
+
+
 @pytest.mark.parametrize("mesh, text", [
     ({}, "give vertices and faces, or a filename"),
     ({"vertices": [[0, 0, 0]]}, "give vertices and faces, or a filename"),
@@ -146,6 +182,10 @@ def test_meshes_are_arrays(folder, tmp_path):
     ({"vertices": [[0, 0]], "faces": [[0, 0, 0]]}, r"positions have shape \(V, 3\), not \(1, 2\)"),
     ({"vertices": [[0, 0, 0], [1, 0, 0], [0, np.nan, 0]], "faces": [[0, 1, 2]]}, ".*not finite"),
     ({"vertices": [[0, 0, 0]], "faces": [[0, 0, 0]], "filename": "a.ply"}, "give vertices"),
+    ({"vertices": [[0, 0, 0]], "faces": [[0, 0, 0]], "vertex_color": [1, 2]},
+     r"vertex_color has shape \(1, 3\), not \(2,\)"),
+    ({"vertices": [[0, 0, 0]], "faces": [[0, 0, 0]], "face_a": [1, 2]},
+     r"face_a has shape \(1, 1 or 3\), not \(2,\)"),
 ])
 def test_mistakes_in_meshes_have_a_place(mesh, text):
     with pytest.raises(limn.InputError, match=rf"^dict\.roof: error: {text}"):

@@ -192,6 +192,24 @@ def test_a_fit_in_a_step_is_left_alone(scene):
     assert [record.step for record in fit.history] == [0, 1, 2]
 
 
+def test_a_list_of_targets_is_of_the_sensors():
+    sensor = {"type": "perspective", "film": {"type": "hdrfilm", "width": 6, "height": 4}}
+    scene = limn.load_dict({"type": "scene", "left": sensor, "sky": {"type": "constant"}, "right": {
+        **sensor, "to_world": limn.Transform().translate([0.2, 0, 0])},
+        "ball": {"type": "sphere", "center": [0, 0, 4]}})
+    targets = [limn.render(scene.view(i), spp=4) for i in (0, 1)]
+    scene["ball.bsdf.reflectance"] = 0.3
+    fits = [limn.fit(scene, targets, "ball.bsdf.reflectance", 2, spp=2),
+            limn.fit(scene.view(1), targets, "ball.bsdf.reflectance", 2, spp=2),
+            limn.fit(scene, targets[0], "ball.bsdf.reflectance", 2, spp=2,
+                     views=[(scene.view("right"), targets[1].value)])]
+    losses = [[record.loss for record in fit.history] for fit in fits]
+    assert losses[0] == losses[1] == losses[2]
+    assert len(fits[0].scenes) == 2
+    with pytest.raises(limn.InputError, match="^error: target: 1 images for 2 sensors"):
+        limn.Fit(scene, targets[:1], "ball.bsdf.reflectance")
+
+
 @pytest.mark.parametrize("view, text", [
     ((1, 2), r"^views\[0\]: error: expected \(scene, target\)"),
     (3, r"^views\[0\]: error: expected \(scene, target\)"),

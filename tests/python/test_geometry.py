@@ -75,14 +75,40 @@ def test_slopes_of_steps_are_those_of_the_vertices(scene, adjoint):
     from_center = (1 + grown) * (before - center) @ turn.T
     after = center + [along, 0, 0] + from_center
     np.testing.assert_allclose(moved.mesh("tent").positions, after, atol=1e-5)
-    names = motions.names_for([*given, "tent.vertex_positions"])
-    slopes = limn.backward(moved, adjoint, names, spp=8)
+    slopes = limn.backward(moved, adjoint, [*given, "tent.vertex_positions"], spp=8)
     g = slopes["tent.vertex_positions"].value
     for name, velocity in (("tent.rotate.y", np.cross([0, 1, 0], from_center)),
                            ("tent.scale", from_center / (1 + grown)),
                            ("tent.translate.x", np.array([1, 0, 0]) + 0 * before)):
-        np.testing.assert_allclose(motions.slope(name, slopes, moved), (g * velocity).sum(),
-                                   rtol=1e-4, err_msg=name)
+        np.testing.assert_allclose(slopes[name].value, (g * velocity).sum(), rtol=1e-4,
+                                   err_msg=name)
+
+
+def test_turning_back_ends_where_it_began(scene):
+    """The center of the tent's bounds moves as it turns; what it turns about does not."""
+    before = scene.mesh("tent").positions.copy()
+    for step in (0.5, 0.7, -0.4):
+        scene.move("tent.rotate.x", step)
+    scene.move("tent.translate.y", 2)
+    scene.move("tent.scale", 0.5)
+    centers = [(p.min(axis=0) + p.max(axis=0)) / 2 for p in (before, scene.mesh("tent").positions)]
+    assert abs(centers[1] - centers[0] - [0, 2, 0]).max() > 0.01
+    for name, step in (("tent.scale", -0.5), ("tent.rotate.x", -0.8), ("tent.translate.y", -2)):
+        scene.move(name, step)
+    np.testing.assert_allclose(scene.mesh("tent").positions, before, atol=2e-6)
+
+
+def test_another_mesh_turns_about_its_own_bounds(scene):
+    scene.move("tent.rotate.x", 0.5)
+    scene["tent.vertex_positions"] = scene["tent.vertex_positions"] + np.float32([1, 0, 0])
+    other = scene.copy()
+    other.set_mesh("tent", scene.mesh("tent").positions, scene.mesh("tent").faces)
+    for s in (scene, other):
+        points = s.mesh("tent").positions
+        center = (points.min(axis=0) + points.max(axis=0)) / 2
+        s.move("tent.rotate.z", np.pi)
+        turned = s.mesh("tent").positions
+        np.testing.assert_allclose(turned[:, :2], (2 * center - points)[:, :2], atol=2e-6)
 
 
 def test_steps_that_cannot_be_given(scene):

@@ -136,6 +136,18 @@ def test_importing_says_nothing_and_starts_nothing():
     assert done.stdout + done.stderr == ""
 
 
+# As PyTorch, scikit-learn and others load it. Its thread-local variables need space that the loader
+# has little of, which a module must leave.
+@pytest.mark.parametrize("order", ["limn, openmp", "openmp, limn"])
+def test_openmp_loads_beside_it(tmp_path, order):
+    (tmp_path / "openmp.py").write_text("import ctypes; ctypes.CDLL('libgomp.so.1')")
+    run = {"cwd": tmp_path, "capture_output": True, "text": True, "check": False}
+    if subprocess.run([sys.executable, "-c", "import openmp"], **run).returncode:
+        pytest.skip("no libgomp.so.1")
+    done = subprocess.run([sys.executable, "-c", f"import {order}"], **run)
+    assert done.returncode == 0, done.stderr
+
+
 # nanobind tells at the end what was not given back.
 def test_runs_print_nothing_and_leak_nothing(folder):
     code = ("import limn\n"

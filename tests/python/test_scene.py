@@ -81,7 +81,7 @@ def test_text_is_as_good_as_a_file(folder, scene):
      "[2.22507e-308, 180]"),
     (lambda s, f: s.__setitem__("tent.rotate.x", 1),
      '{f}/scene.xml: error: parameter "tent.rotate.x" moves things from where they are and has no '
-     "value to set: move it by a step"),
+     'value to set: scene.move("tent.rotate.x", step)'),
     (lambda s, f: s.__setitem__("tent.vertex_positions", np.zeros((5, 3))),
      '{f}/scene.xml: error: parameter "tent.vertex_positions" has shape (6, 3), not (5, 3)'),
     (lambda s, f: s.__setitem__("tent.vertex_positions", np.full((6, 3), np.inf)),
@@ -115,6 +115,17 @@ def test_what_is_refused_and_why(folder, scene, call, text):
         call(scene, folder)
     assert str(caught.value) == text.replace("{f}", str(folder))
     assert same(image(scene), before)
+
+
+def test_a_scene_knows_its_names(scene):
+    assert list(scene) == list(scene.parameters)
+    assert "metal.alpha" in scene and "metal.beta" not in scene and 3 not in scene
+
+
+def test_another_sensor_is_a_view(scene):
+    for call in (limn.render, lambda s, **k: limn.gradient(s, "metal.alpha", **k)):
+        with pytest.raises(TypeError, match=r"no argument 'sensor' \(use scene.view\(sensor\)\)"):
+            call(scene, sensor=1)
 
 
 def test_unknown_parameters_are_key_errors_too(scene):

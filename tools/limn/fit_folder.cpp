@@ -42,7 +42,7 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ViewArguments, scene, defines, sensor, target
                                    fingerprints)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FitState::Numbers, values, first, second, natural_step, lambda)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FitState::Shape, positions, normals, faces)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FitState::View, camera, shapes, values, courses, texels)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FitState::View, camera, shapes, pivots, values, courses, texels)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FitState, steps, parameters, moves, changes, views)
 
 namespace {
@@ -50,7 +50,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-constexpr int kFormat = 6;                  // of fit.json and state.cbor
+constexpr int kFormat = 7;                  // of fit.json and state.cbor
 constexpr size_t kDistanceSamples = 10000;  // on each surface; not tuned
 
 // Calls visit(name, member) for what is no row of the table of options: reading and writing go over

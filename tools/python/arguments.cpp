@@ -103,8 +103,10 @@ void Arguments::read(const nb::args& positional, const nb::kwargs& named) {
     const auto found =
         std::find_if(list_.begin(), list_.end(), [&](const Argument& a) { return a.name == name; });
     if (found == list_.end()) {
+      const char* advice = name == "sensor" ? " (use scene.view(sensor))" : "";
       throw nb::type_error(
-          fmt::format("{}() has no argument '{}': it takes {}", function_, name, list()).c_str());
+          fmt::format("{}() has no argument '{}'{}: it takes {}", function_, name, advice, list())
+              .c_str());
     }
     set(*found, value);
   }

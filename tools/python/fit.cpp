@@ -15,6 +15,9 @@ namespace limn::python {
 
 namespace {
 
+constexpr const char* kTargetType =
+    "numpy.typing.ArrayLike | collections.abc.Sequence[numpy.typing.ArrayLike]";
+
 struct FitHandle {
   Fit fit;
   std::vector<FitRecord> history;
@@ -52,7 +55,7 @@ std::vector<FitView> to_views(const SceneHandle& scene, nb::handle target, nb::h
 
 struct FitCall {
   const SceneHandle* scene = nullptr;
-  nb::object target, mask = nb::none();
+  nb::object target, mask = nb::none(), first;
   Names names;
   nb::object views = nb::make_tuple();
   std::map<std::string, std::pair<double, double>> bounds;
@@ -61,7 +64,8 @@ struct FitCall {
 
   void take(Arguments& a) {
     add_scene(a, scene);
-    a.add("target", kArrayType, "", target, "(H, W, 3) or (H, W).");
+    a.add("target", kTargetType, "", target,
+          "(H, W, 3) or (H, W); of a scene with several sensors a list, one for each.");
     a.add("names", kNamesType, "", names, "scalars and arrays, as \"object.vertex_positions\".");
     a.add("mask", kArrayOrNoneType, "None", mask, "weights of the pixels, (H, W).");
     a.add("views", "collections.abc.Sequence[tuple[object, ...]]", "()", views,
@@ -74,6 +78,31 @@ struct FitCall {
     a.add_former("sampler", "method");
   }
 
+  // A list of images: each is the target of a sensor, the first of `scene`.
+  void spread_targets() {
+    if (!nb::isinstance<nb::list>(target) && !nb::isinstance<nb::tuple>(target)) return;
+    const nb::list images(target);
+    for (nb::handle image : images) {
+      if (!nb::hasattr(image, "shape")) return;
+      const nb::object shape = image.attr("shape");
+      if (nb::len(nb::handle(shape)) != 3) return;
+    }
+    const size_t sensors = scene->get().sensors.size();
+    if (images.size() != sensors) {
+      throw InputError(fmt::format("target: {} images for {} sensors", images.size(), sensors));
+    }
+    const nb::object whole = nb::cast(*scene);
+    nb::list all;
+    for (size_t i = 1; i < sensors; ++i) {
+      all.append(nb::make_tuple(whole.attr("view")(i), images[i]));
+    }
+    all.extend(views);
+    views = all;
+    target = images[0];
+    first = whole.attr("view")(0);
+    scene = &nb::cast<const SceneHandle&>(first);
+  }
+
   // SceneHandle's, of each view.
   std::vector<std::map<std::string, double>> moved() const {
     std::vector<std::map<std::string, double>> all{scene->moved};
@@ -83,6 +112,7 @@ struct FitCall {
 
   Fit make(const Arguments& given) {
     given.refuse_samples(options.backward.points, {"spp"});
+    spread_targets();
     for (const auto& [name, range] : bounds) {
       options.bounds.push_back({name, range.first, range.second});
     }

@@ -85,6 +85,12 @@ void assign(SceneHandle& scene, const std::string& name, nb::handle value) {
     scene.moved[parameter.name] = numbers[0];
     return;
   }
+  if (parameter.array.empty() && parameter.value(scene.get()).empty()) {
+    throw InputError({scene.get().file},
+                     fmt::format("parameter \"{0}\" moves things from where they are and has no "
+                                 "value to set: scene.move(\"{0}\", step)",
+                                 parameter.name));
+  }
   std::vector<std::string> warnings;
   parameter.assign(scene.edit(), numbers, &warnings);
   warn_all(warnings);
@@ -94,6 +100,16 @@ std::vector<std::string> names_of(const ParametersView& view) {
   std::vector<std::string> names;
   for (const Parameter& p : list_parameters(view.scene->get())) names.push_back(p.name);
   return names;
+}
+
+bool has(const SceneHandle& scene, nb::handle name) {
+  if (!nb::isinstance<nb::str>(name)) return false;
+  try {
+    find(scene, nb::cast<std::string>(name));
+  } catch (const InputError&) {
+    return false;
+  }
+  return true;
 }
 
 std::string repr(const ParameterView& view) {
@@ -140,15 +156,7 @@ void bind_mapping(nb::module_& m) {
       .def("__len__",
            [](const ParametersView& v) { return list_parameters(v.scene->get()).size(); })
       .def("__contains__",
-           [](const ParametersView& v, nb::handle name) {
-             if (!nb::isinstance<nb::str>(name)) return false;
-             try {
-               find(*v.scene, nb::cast<std::string>(name));
-             } catch (const InputError&) {
-               return false;
-             }
-             return true;
-           })
+           [](const ParametersView& v, nb::handle name) { return has(*v.scene, name); })
       .def(
           "get",
           [](nb::handle self, const std::string& name, nb::handle otherwise) {
@@ -199,6 +207,14 @@ void bind_parameters(nb::module_& m, nb::class_<SceneHandle>& scene) {
           nb::arg("name"),
           nb::sig("def __getitem__(self, name: str) -> float | numpy.ndarray | None"),
           "The value of a parameter, see limn.Parameter.value.")
+      .def("__contains__", has, nb::arg("name"),
+           nb::sig("def __contains__(self, name: object) -> bool"),
+           "Is there a parameter of this name?")
+      .def(
+          "__iter__",
+          [](SceneHandle& s) { return nb::iter(nb::cast(names_of(ParametersView{&s}))); },
+          nb::sig("def __iter__(self) -> collections.abc.Iterator[str]"),
+          "Over the names of all parameters.")
       .def("__setitem__", assign, nb::arg("name"), nb::arg("value"),
            nb::sig("def __setitem__(self, name: str, value: numpy.typing.ArrayLike) -> None"),
            "Sets the value of a parameter: checked, copied; views that were taken stay as they "

@@ -98,6 +98,21 @@ SceneHandle load(nb::handle file, double smooth_as, const nb::kwargs& substituti
   });
 }
 
+// The scene of a dictionary: places[i] is what line i + 1 came from, for later messages.
+SceneHandle load_placed(const std::string& xml, nb::handle folder,
+                        const std::vector<std::string>& places) {
+  const std::string path = to_path("folder", folder);
+  return read([&](std::vector<std::string>* warnings) {
+    Scene scene = read_scene_text(xml, path, {}, warnings);
+    scene.file = places.at(0);
+    for (Shape& shape : scene.shapes) {
+      const auto line = static_cast<size_t>(shape.where.line);
+      if (line > 0) shape.where = {places.at(line - 1)};
+    }
+    return scene;
+  });
+}
+
 SceneHandle load_string(const std::string& xml, nb::handle folder,
                         const nb::kwargs& substitutions) {
   const std::string path = to_path("folder", folder);
@@ -184,7 +199,9 @@ void bind_changes(nb::class_<SceneHandle>& scene) {
           },
           nb::arg("name"), nb::arg("step"),
           "Moves a parameter by `step`, in its unit, from where it is; exact for large steps.\n\n"
-          "Raises limn.InputError, and moves nothing, for a step that is not finite or leads where "
+          "Rotations and scales go about the center of the shape's bounds as it was read, which "
+          "translations move along: steps add up, of rotations about one axis. Raises "
+          "limn.InputError, and moves nothing, for a step that is not finite or leads where "
           "no scene can be.")
       .def(
           "view",
@@ -291,6 +308,9 @@ nb::class_<SceneHandle> bind_scene(nb::module_& m) {
         "smooth. Raises limn.InputError with file, line and column.");
   m.def("advice_on", advice_on, nb::arg("type"),
         "\"; \" and what to write in place of a type of Mitsuba's that limn lacks, or \"\".");
+  m.def("load_placed", load_placed, nb::arg("xml"), nb::arg("folder"), nb::arg("places"),
+        nb::sig("def load_placed(xml: str, folder: str, places: list[str]) -> Scene"),
+        "load_string of a scene whose lines came from other places, for load_dict.");
   m.def("load_string", load_string, nb::arg("xml"), nb::arg("folder") = "",
         nb::arg("substitutions"),
         nb::sig("def load_string(xml: str, folder: str | os.PathLike[str] = '', **substitutions: "

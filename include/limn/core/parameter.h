@@ -2,9 +2,10 @@
 // Scene parameters that can be differentiated, by name:
 //
 //   SHAPE.translate.x|y|z         scene units
-//   SHAPE.rotate.x|y|z            radians, world axes through the center of its bounds
-//   SHAPE.scale                   factor - 1, about the center of its bounds; in fits not below
-//                                 -0.99
+//   SHAPE.rotate.x|y|z            radians, world axes through its pivot: the center of its bounds
+//                                 as it was read, moved along by translations
+//   SHAPE.scale                   factor - 1 of the size as it was read, about the pivot; in fits
+//                                 not below -0.99
 //   SHAPE.vertex_positions        scene units: an array, the V by 3 coordinates of its vertices
 //   SHAPE.vertex_positions.V.x|y|z  one of them: vertex V (from 0) with its copies
 //   SHAPE.vertex_positions:FILE   moves every vertex by the parameter times its vector in FILE
@@ -42,18 +43,10 @@ namespace limn {
 
 class Motion;
 
-// The accumulated motion of a shape since a parameter was found: `moved` translates its pivot (of
-// rotations and scaling) [scene units], and its size is multiplied by 1 + `grown`.
-struct ShapePose {
-  Vec3d moved;
-  double grown = 0;
-};
-
 // A differentiable parameter, resolved once from its name. It holds indices and
 // ids, no pointers into the scene. So it applies to every deep copy of that scene,
-// also after changes: the pivot of a shape (but see at()) and the normals of a
-// displacement stay those of the original. Copies are cheap. `component` is a
-// row-major index into an array's numbers (y of vertex 2: 2 * 3 + 1); 0 for
+// also after changes: the normals of a displacement stay those of the original. Copies are cheap.
+// `component` is a row-major index into an array's numbers (y of vertex 2: 2 * 3 + 1); 0 for
 // scalars.
 struct Parameter {
   std::string name;
@@ -111,14 +104,6 @@ struct Parameter {
   // V displacement directions, for a displacement parameter; else
   // empty.
   std::vector<Vec3d> directions(const Scene& scene) const;
-
-  // The rigid or scaling motion of the shape per unit of the parameter: a unit vector for
-  // translations, grown = 1 for scales, else nothing.
-  ShapePose pose_per_unit(ShapeId shape) const;
-  // This parameter for a shape in another pose. Rotations and scales use the pivot moved with the
-  // shape, and scales keep the original unit of size. Thus steps of translations, rotations about
-  // one axis and scales add up, in any order.
-  Parameter at(const ShapePose& pose) const;
 
   // The texels that the parameter changes: of the environment or of a texture; null if none.
   TexelMap* texel_map(Scene& scene) const;

@@ -25,10 +25,19 @@ enum class ShadingModel {
 
 struct Exposure;  // exposure.h
 
+// What rotations and scales of a shape go about, and what scales are in units of.
+struct Pivot {
+  Vec3d center;     // world space
+  double size = 1;  // over that of the start
+};
+
 struct Shape {
   std::string id;  // "" if the file gives none
   SourceLocation where;
   Mesh mesh;
+  // None: the center of the mesh's bounds. The first motion as a whole (parameter.h) keeps where
+  // that is, translations move it, and other meshes end it. So all motions since add up.
+  std::optional<Pivot> pivot;
   std::shared_ptr<Bsdf> bsdf;  // never null; shared between shapes that refer to one element
   bool is_emitter = false;
   // Of an area emitter: emitted from the front of every face; of a textured one the mean.

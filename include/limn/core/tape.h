@@ -104,8 +104,9 @@ class Tape {
   };
   void sweep(uint32_t begin, uint32_t end);
 
-  // Used in inner loops. With the default model, a shared library would access it by a call.
-  [[gnu::tls_model("initial-exec")]] static inline constinit thread_local Tape* current_ = nullptr;
+  // Not of the model initial-exec: by it a Python module takes the few bytes that loaders have for
+  // all such libraries, and PyTorch's could not be loaded beside it.
+  static inline constinit thread_local Tape* current_ = nullptr;
   const SceneSlots* slots_;
   std::vector<uint32_t> ends_;  // of the entries of each node
   std::vector<Entry> entries_;

@@ -21,7 +21,8 @@
 
 namespace limn {
 
-// What becomes of a gradient g, in natural steps: those of Parameter::natural_step.
+// What becomes of a gradient g, in natural steps: Parameter::natural_step; of what moves a shape,
+// what moves its fastest vertex by 1 % of the diagonal.
 enum class OptimiserKind {
   kAdamUniform,      // Adam, but all vertices of a shape share the largest second moment, so that
                      // steps keep the gradient's direction (Nicolet et al. 2021, Sec. 3.4)
@@ -65,7 +66,8 @@ struct FitOptions {
   LossKind loss = LossKind::kL2;
   int pyramid = 1;  // levels of image_loss()
   OptimiserKind optimiser = OptimiserKind::kAdamUniform;
-  // Of the first step, in natural steps: 1 % of a shape's diagonal, 0.01 radians, 1 % of a value.
+  // Of the first step, in natural steps: what moves a shape's fastest vertex by 1 % of a diagonal,
+  // 0.01 radians of the camera, 1 % of a value.
   double step = 1;
   int step_half_life = 0;  // after so many steps a step is half as long; 0: all are alike
   int spp_doubling = 0;    // after so many steps there are twice the samples; 0: always as many
@@ -143,6 +145,7 @@ struct FitState {
   struct View {
     std::vector<double> camera;               // origin, left, up, forward, fov, lens
     std::vector<Shape> shapes;                // of those that are moved, in the scene's order
+    std::vector<std::vector<double>> pivots;  // the same: center and size; empty: none
     std::vector<std::vector<double>> values;  // of each parameter but vertices; empty: it has none
     // 3 each, of the courses of moved shapes and of the camera: the center and keyframes' places.
     std::vector<double> courses;

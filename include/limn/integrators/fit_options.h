@@ -72,8 +72,8 @@ void visit_options(Like<FitOptions> auto& o, auto&& visit) {
                "gradient-descent, or lbfgs, which needs a loss without noise (the method "
                "analytic)"));
   visit(o.step, Option{"step",
-                       "Length of the first step in natural steps: 1 % of a shape's diagonal, 0.01 "
-                       "radians, 1 % of a value",
+                       "Length of the first step in natural steps: what moves a shape's fastest "
+                       "vertex by 1 % of its diagonal, 0.01 radians of the camera, 1 % of a value",
                        1e-12L, 1e12L});
   visit(o.step_half_life,
         Option{"step_half_life", "Halve the step length every so many steps", 1, 1 << 30}.or_zero(

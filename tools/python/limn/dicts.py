@@ -14,7 +14,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 import numpy.typing as npt
 
-from ._limn import Scene, advice_on, load_string, write_exr
+from ._limn import Scene, advice_on, load_placed, write_exr
 from .errors import InputError
 from .meshes import read_foreign, write_ply
 
@@ -252,17 +252,20 @@ class _Writer:
 
     def mesh(self, place: str, what: Mapping[str, Any]) -> dict[str, Any]:
         """The same shape with a mesh that limn reads: of a file, or of arrays."""
-        rest = {k: v for k, v in what.items() if k not in ("vertices", "faces", "filename")}
+        own = [k for k in what if k.startswith(("vertex_", "face_")) and k != "face_normals"]
+        rest = {k: v for k, v in what.items() if k not in ("vertices", "faces", "filename", *own)}
         file = what.get("filename")
         if (file is None) != ("vertices" in what and "faces" in what):
             raise InputError(f"{place}: error: give vertices and faces, or a filename")
+        if file is not None and own:
+            raise InputError(f"{place}.{own[0]}: error: attributes go with vertices and faces")
         if isinstance(file, str) and file.lower().endswith((".obj", ".ply")):
             return {**rest, "type": file.lower()[-3:], "filename": file}
         path = os.path.join(self.scratch, f"{len(self.files)}.ply")
         self.files[path] = place
         try:
             if file is None:
-                write_ply(path, what["vertices"], what["faces"])
+                write_ply(path, what["vertices"], what["faces"], **{k: what[k] for k in own})
             else:
                 write_ply(path, *read_foreign(os.path.join(self.folder, file)))
         except (TypeError, ValueError) as error:
@@ -342,9 +345,9 @@ def load_dict(scene: Mapping[str, Any], folder: str = "") -> Scene:
 
     Keys are the names of shapes, materials and lights; those inside others have names with a dot
     ("ball.bsdf.reflectance"), unless they say "id". {"type": "ref", "id": ...} names one that stands
-    before. {"type": "mesh", "vertices": (V, 3), "faces": (F, 3)} is a shape of arrays; with a
-    "filename" in their place it is one of a file, of STL, glTF and other formats if trimesh is
-    installed. Files are looked for in `folder`. Raises limn.InputError with the place:
+    before. {"type": "mesh", "vertices": (V, 3), "faces": (F, 3)} is a shape of arrays, with the
+    attributes of write_ply ("vertex_color", ...); with a "filename" in their place it is one of a
+    file, of STL, glTF and other formats if trimesh is installed. Files are looked for in `folder`. Raises limn.InputError with the place:
     dict.ball.bsdf.
     """
     if not isinstance(scene, Mapping) or scene.get("type") != "scene":
@@ -370,7 +373,7 @@ def _load(scene: Mapping[str, Any], writer: _Writer) -> Scene:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:
-            read = load_string("\n".join(writer.lines), writer.folder)
+            read = load_placed("\n".join(writer.lines), writer.folder, writer.places)
         except InputError as error:
             raise type(error)(placed(str(error))) from None
     for warning in caught:

@@ -21,7 +21,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.scipy.linalg import expm
 
-from . import Scene, render as _render
+from . import Scene, backward as _reverse, render as _render
 from .motions import Motions, per_number
 
 __all__ = ["pose", "render"]
@@ -37,18 +37,17 @@ class _Call:
     spp_grad: int | None
     threads: int
 
-    def motions(self, values: Mapping[str, Any]) -> Motions:
-        return Motions(self.scene, {n: np.asarray(v, dtype=np.float64) for n, v in values.items()})
+    def moved(self, values: Mapping[str, Any]) -> Scene:
+        numbers = {n: np.asarray(v, dtype=np.float64) for n, v in values.items()}
+        return Motions(self.scene, numbers).moved(self.scene)
 
     def image(self, values: Mapping[str, Any], seed: Any) -> Any:
-        moved = self.motions(values).moved(self.scene)
-        return _render(moved, self.spp, 2 * int(seed), threads=self.threads).value
+        return _render(self.moved(values), self.spp, 2 * int(seed), threads=self.threads).value
 
     def slopes(self, values: Mapping[str, Any], seed: Any, adjoint: Any) -> dict[str, Any]:
-        motions = self.motions(values)
-        found = motions.backward(motions.moved(self.scene), np.asarray(adjoint), list(values),
-                                 self.spp_grad, 2 * int(seed) + 1, self.threads)
-        return {n: per_number(found[n], v.shape).astype(v.dtype) for n, v in values.items()}
+        found = _reverse(self.moved(values), np.asarray(adjoint), list(values),
+                         spp=self.spp_grad, seed=2 * int(seed) + 1, threads=self.threads)
+        return {n: per_number(found[n].value, v.shape).astype(v.dtype) for n, v in values.items()}
 
 
 @partial(jax.custom_vjp, nondiff_argnums=(0,))

@@ -11,13 +11,22 @@ import numpy.typing as npt
 from .errors import InputError
 
 
+# What the numbers of these are called in PLY; of other attributes NAME_0, NAME_1, NAME_2.
+_PROPERTIES = {"vertex_normals": ("nx", "ny", "nz"), "vertex_texcoords": ("u", "v"),
+               "vertex_color": ("r", "g", "b"), "face_color": ("r", "g", "b")}
+
+
 def write_ply(
-    file: str | os.PathLike[str], positions: npt.ArrayLike, faces: npt.ArrayLike
+    file: str | os.PathLike[str],
+    positions: npt.ArrayLike,
+    faces: npt.ArrayLike,
+    **attributes: npt.ArrayLike,
 ) -> None:
     """Writes a mesh as binary PLY: (V, 3) positions as float32, (F, 3) indices of corners.
 
     limn.write_ply("found.ply", mesh.positions, mesh.faces) with mesh = scene.mesh("ball");
-    limn.load and others read it.
+    limn.load and others read it. attributes: vertex_normals (V, 3), vertex_texcoords (V, 2),
+    vertex_NAME (V, 1 or 3) and face_NAME (F, 1 or 3), as float32; vertex_color is a colour, linear.
     """
     points = np.asarray(positions, dtype="<f4")
     corners = np.asarray(faces)
@@ -28,8 +37,12 @@ def write_ply(
         raise InputError(f"faces have shape (F, 3) and are integers, not {what}")
     if corners.size and not (0 <= corners.min() and corners.max() < len(points)):
         raise InputError(f"faces name vertices {corners.min()} to {corners.max()} of {len(points)}")
-    rows = np.empty(len(corners), dtype=[("count", "u1"), ("corners", "<u4", 3)])
-    rows["count"], rows["corners"] = 3, corners
+    vertices = _table({"x": points[:, 0], "y": points[:, 1], "z": points[:, 2]},
+                      attributes, "vertex_", len(points))
+    rows = _table({"count": np.full(len(corners), 3, "u1"), "corners": corners.astype("<u4")},
+                  attributes, "face_", len(corners))
+    if wrong := [n for n in attributes if not n.startswith(("vertex_", "face_"))]:
+        raise InputError(f"{wrong[0]}: attributes are called vertex_NAME or face_NAME")
     # Under another name first: nobody reads half a file.
     path = os.fspath(file)
     if not isinstance(path, str):
@@ -38,7 +51,7 @@ def write_ply(
     unfinished = f"{path}.{os.getpid()}.tmp"
     try:
         with open(unfinished, "wb") as stream:
-            stream.write(_header(len(points), len(rows)) + points.tobytes() + rows.tobytes())
+            stream.write(_header(vertices, rows) + vertices.tobytes() + rows.tobytes())
         os.replace(unfinished, path)
     finally:
         if os.path.exists(unfinished):
@@ -60,10 +73,33 @@ def read_foreign(file: str) -> tuple[Any, Any]:
     return mesh.vertices, mesh.faces
 
 
-def _header(vertices: int, faces: int) -> bytes:
+def _table(columns: dict[str, Any], attributes: dict[str, Any], kind: str, count: int) -> Any:
+    """The rows of a PLY element: its own columns, then those of the attributes of its kind."""
+    for name, given in attributes.items():
+        if not name.startswith(kind):
+            continue
+        values = np.atleast_1d(np.asarray(given, dtype="<f4"))
+        values = values.reshape(len(values), -1)
+        each = values.shape[1]
+        called = _PROPERTIES.get(name, [f"{name.removeprefix(kind)}_{k}" for k in range(each)])
+        known = (len(called),) if name in _PROPERTIES else (1, 3)
+        if len(values) != count or each not in known:
+            wanted = " or ".join(map(str, known))
+            raise InputError(f"{name} has shape ({count}, {wanted}), not {np.shape(given)}")
+        columns.update({column: values[:, k] for k, column in enumerate(called)})
+    rows = np.empty(count, [(n, c.dtype.str, c.shape[1:]) for n, c in columns.items()])
+    for name, column in columns.items():
+        rows[name] = column
+    return rows
+
+
+def _header(vertices: Any, faces: Any) -> bytes:
+    def floats(table: Any) -> str:
+        own = [n for n in table.dtype.names if n not in ("count", "corners")]
+        return "".join(f"property float {name}\n" for name in own)
+
     return (
-        f"ply\nformat binary_little_endian 1.0\nelement vertex {vertices}\n"
-        "property float x\nproperty float y\nproperty float z\n"
-        f"element face {faces}\nproperty list uchar uint vertex_indices\n"
+        f"ply\nformat binary_little_endian 1.0\nelement vertex {len(vertices)}\n{floats(vertices)}"
+        f"element face {len(faces)}\nproperty list uchar uint vertex_indices\n{floats(faces)}"
         "end_header\n"
     ).encode()

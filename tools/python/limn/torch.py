@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import torch
 
-from . import Scene, render as _render
+from . import Scene, backward as _backward, render as _render
 from .motions import Motions, per_number
 
 __all__ = ["pose", "render"]
@@ -57,25 +57,22 @@ class _Render(torch.autograd.Function):
         numbers = {
             n: t.detach().to("cpu", torch.float64).numpy() for n, t in zip(run.names, tensors)
         }
-        motions = Motions(scene, numbers)
-        scene = motions.moved(scene)
-        ctx.run = _Held(scene), motions, run
+        scene = Motions(scene, numbers).moved(scene)
+        ctx.run = _Held(scene), run
         ctx.save_for_backward(*tensors)
         return torch.from_numpy(_render(scene, run.spp, 2 * run.seed, threads=run.threads).value)
 
     @staticmethod
     @torch.autograd.function.once_differentiable
     def backward(ctx: Any, adjoint: Any) -> tuple[Any, ...]:
-        held, motions, run = ctx.run
+        held, run = ctx.run
         wanted = [n for n, need in zip(run.names, ctx.needs_input_grad[2:]) if need]
         found = {}
         if wanted:
-            found = motions.backward(
-                held.scene, adjoint.cpu().numpy(), wanted, run.spp_grad, 2 * run.seed + 1,
-                run.threads,
-            )  # fmt: skip
+            found = _backward(held.scene, adjoint.cpu().numpy(), wanted, spp=run.spp_grad,
+                              seed=2 * run.seed + 1, threads=run.threads)  # fmt: skip
         gradients = [
-            _gradient(found[n], t) if n in found else None
+            _gradient(found[n].value, t) if n in found else None
             for n, t in zip(run.names, ctx.saved_tensors)
         ]
         return None, None, *gradients
@@ -110,8 +107,8 @@ def render(
     values: tensors of the shapes that scene[name] has, of any real dtype and on any device (the
     image is on the CPU); one number sets all channels of a colour. The scene itself stays as it is.
     Of a parameter without a value (rotations, scales) it is the step by which it moves from where
-    the scene has it; a shape is scaled first, then turned about its center, about one axis, then
-    translated.
+    the scene has it; a shape is scaled first, then turned about its center (see Scene.move), about
+    one axis, then translated.
     spp, spp_grad: samples per pixel of the image and of its gradient; None: spp_grad as spp, spp as
     the scene says. The image has the seed 2 * seed, the gradient 2 * seed + 1: both are independent,
     so that the gradient is unbiased where the loss is linear in the image. For a squared difference
