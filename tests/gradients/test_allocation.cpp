@@ -214,7 +214,10 @@ TEST(SpreadSamples, KnowTermsOfTheFilm) {
       }
       SamplePlan plan;
       spread_samples(figures, grid, plan);
-      EXPECT_LE(product(plan.counts[0][0], plan.uniform[1]), 1.3 * least) << of_path << " " << cost;
+      // Counts of the film are closer to the best than those of paths.
+      const double most = of_path > 0 ? 1.15 : 1.04;
+      EXPECT_LE(product(plan.counts[0][0], plan.uniform[1]), most * least)
+          << of_path << " " << cost;
     }
   }
 }
