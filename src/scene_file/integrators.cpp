@@ -71,17 +71,24 @@ const ObjectDescription* find_type(const SceneDescription& description, const st
 
 // Volumetric integrators go straight through masks also towards lights, and count no bounce there.
 // Paths go through by chance and then count a light that they meet fully, so the expectation is the
-// same: without a limit of bounces, and but for lights that no path meets.
-void check_null(const SceneDescription& description, const std::string& integrator, int max_depth) {
+// same: without a limit of bounces, and but for lights that no path meets and hidden emitters,
+// which are hidden behind what counts as no bounce, too.
+void check_null(const SceneDescription& description, const std::string& integrator,
+                const Scene& scene) {
   const auto* null = find_type(description, "bsdf", {"mask", "null", "thindielectric"});
   if (!null) return;
   const auto fail = [&](const std::string& what) {
     throw InputError(null->where, "bsdf \"" + null->type + "\": " + integrator + what);
   };
-  if (max_depth >= 0) {
+  if (scene.max_depth >= 0) {
     fail(
         " counts no bounce there, and path does: set max_depth to -1, or change the integrator to "
         "path");
+  }
+  if (scene.hide_emitters) {
+    fail(
+        " hides emitters behind it, and path shows them: set hide_emitters to false, or change the "
+        "integrator to path");
   }
   const auto* light =
       find_type(description, "emitter", {"directional", "point", "projector", "spot"});
@@ -117,7 +124,7 @@ void read_integrator(const ObjectDescription& object, const SceneDescription& de
   }
   scene.max_depth = type->max_depth;
   if (!type->is_depth_fixed) {
-    constexpr char kRange[] = "must be -1 (no limit) or 1 and more (of 0 the image is black)";
+    constexpr char kRange[] = "must be -1 (no limit) or at least 1 (0 gives a black image)";
     scene.max_depth = depth(p, "max_depth", type->max_depth, -1, kRange);
     if (scene.max_depth == 0) p.fail("max_depth", kRange);
   }
@@ -125,7 +132,7 @@ void read_integrator(const ObjectDescription& object, const SceneDescription& de
   scene.hide_emitters = p.boolean("hide_emitters", false);
   for (const std::string& name : type->ignored) p.has(name);
   p.check_all_used();
-  if (type->passes_null) check_null(description, object.type, scene.max_depth);
+  if (type->passes_null) check_null(description, object.type, scene);
 }
 
 }  // namespace limn

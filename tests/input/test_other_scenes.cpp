@@ -61,6 +61,12 @@ TEST(OtherScenes, VolpathWithWhatItPasses) {
   EXPECT_NE(message_of("<integrator type=\"prbvolpath\"/>" + net)
                 .find("bsdf \"mask\": prbvolpath counts no bounce there"),
             std::string::npos);
+  EXPECT_NE(
+      message_of("<integrator type=\"volpath\"><boolean name=\"hide_emitters\" value=\"true\"/>"
+                 "</integrator>" +
+                 net)
+          .find("bsdf \"mask\": volpath hides emitters behind it"),
+      std::string::npos);
   EXPECT_NE(message_of("<integrator type=\"volpath\"/>" + net + lamp)
                 .find("bsdf \"mask\": volpath lets light of a point pass it"),
             std::string::npos);
