@@ -104,12 +104,14 @@ void Parameter::move_checked(Scene& scene, double step) const {
     for (const Vec3f& p : there.shapes[i].mesh.positions) {
       for (int k = 0; k < 3; ++k) largest = std::max(largest, std::fabs(double{p[k]}));
     }
-    if (largest <= kLargestCoordinate && bounds_of(there.shapes[i].mesh).diagonal() > 0) continue;
+    const bool is_point = bounds_of(there.shapes[i].mesh).diagonal() == 0 ||
+                          (there.shapes[i].pivot && there.shapes[i].pivot->size <= 0);
+    if (largest <= kLargestCoordinate && !is_point) continue;
     throw InputError(
         {scene.file},
         fmt::format("parameter \"{}\": a step of {:g} is too long: the shape would {}", name, step,
                     largest <= kLargestCoordinate
-                        ? "be a point"
+                        ? "be a point, or inside out"
                         : fmt::format("go beyond {:g}", kLargestCoordinate)));
   }
   scene = std::move(there);

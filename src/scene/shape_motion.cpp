@@ -337,9 +337,9 @@ void add_shape_parameters(const Scene& scene, std::vector<Parameter>& list) {
       list.push_back({shape.id + ".rotate." + end, "radians", 0.01, 1,
                       std::make_shared<ShapeRotation>(id, axis, pivot)});
     }
-    list.push_back(
-        {shape.id + ".scale", "factor", 0.01, 1, std::make_shared<ShapeScaling>(id, pivot)});
-    list.back().least = kLeastScale - 1;
+    list.push_back({shape.id + ".scale", "factor", 0.01 * pivot.size, 1,
+                    std::make_shared<ShapeScaling>(id, pivot)});
+    list.back().least = kLeastScale - pivot.size;
     list.push_back({shape.id + ".vertex_positions", "scene units", step,
                     3 * shape.mesh.positions.size(), std::make_shared<VertexArray>(id)});
     list.back().array = {shape.mesh.positions.size(), 3};

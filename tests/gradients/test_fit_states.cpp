@@ -301,6 +301,19 @@ TEST(Fit, TurnsAddUp) {
   }
 }
 
+// Where an earlier fit left a shape smaller, less is left until it is a point.
+TEST(Fit, ShapesAreNotScaledThroughAPointInStages) {
+  const TempFiles files;
+  Scene scene = shadow_scene(files, 0.1);
+  for (const double size : {1.0, 0.5}) {
+    const Parameter scale = find_parameter(scene, "body.scale");
+    EXPECT_NEAR(scale.least, 0.01 - size, 1e-12);
+    EXPECT_NEAR(scale.natural_step, 0.01 * size, 1e-12);
+    if (size == 1) scale.move_checked(scene, -0.5);
+    EXPECT_THROW(find_parameter(scene, "body.scale").move_checked(scene, -1.2), InputError);
+  }
+}
+
 // Translated, turned and scaled in turns, a shape is where the sums of all steps take it at once;
 // a state goes on with the same bits. A state of another mesh is none of this fit.
 TEST(Fit, SumsOfStepsAreThePose) {

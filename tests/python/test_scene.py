@@ -247,6 +247,7 @@ def test_moving_is_what_positions_do(scene):
     ("tent.translate.x", float("-inf"), "the step -inf is not finite"),
     ("tent.translate.x", 1e30, "a step of 1e+30 is too long: the shape would go beyond 2e+12"),
     ("tent.scale", -1, "a step of -1 is too long: the shape would be a point"),
+    ("tent.scale", -1.5, "a step of -1.5 is too long: the shape would be a point, or inside out"),
     ("lamp.radiance", -100, "cannot be -96: it must be finite and lie in"),
     ("sensor.fov", 200, "cannot be 240: it must be finite and lie in"),
     ("sensor.translate.x", 1e30, "cannot be 1e+30"),

@@ -28,9 +28,9 @@ def per_number(slope: Any, shape: tuple[int, ...]) -> Any:
 class Motions:
     """What is given for the parameters of a scene: values, and steps of motions.
 
-    A shape is scaled by 1 + s about its pivot c (Scene.move), turned about an axis through c, then
-    translated by t: p = c + t + (1 + s) R (p0 - c). The moved scene has the pivot c + t and knows
-    the size, so that its slopes are those of the steps.
+    A shape of the size z (1 at first) is scaled by 1 + s / z about its pivot c (Scene.move), turned
+    about an axis through c, then translated by t: p = c + t + (1 + s / z) R (p0 - c). The moved
+    scene has the pivot c + t and knows the size, so that its slopes are those of the steps.
     """
 
     def __init__(self, scene: Scene, numbers: Mapping[str, Any]) -> None:
