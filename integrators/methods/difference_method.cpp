@@ -88,8 +88,7 @@ Step find_step(const Scene& scene, const Parameter& parameter, size_t parameters
   settings.seed = run.seed + 1;  // not the samples that the run will take
   DifferenceJob job{parameter.name, steps_to_try(scene, parameter), {}};
   const size_t count = job.steps.size();
-  // Floats hold positions that move by a power of two where they hold any.
-  if (count < 2) return {power_of_two_below(parameter.natural_step), "what floats resolve"};
+  if (count < 2) return {resolved_step(scene, parameter), "what floats resolve"};
   job.combinations = steps_and_changes(count);
   const CentralDifferences r = central_differences(scene, {job}, 0, settings, true);
   seconds += r.seconds;

@@ -50,4 +50,11 @@ double rounding_of_moves(const Scene& scene, const Parameter& parameter, double 
 
 double power_of_two_below(double step) { return std::exp2(std::floor(std::log2(step))); }
 
+double resolved_step(const Scene& scene, const Parameter& parameter) {
+  constexpr double kSpacing = 0x1p-23 / kLeastMove;  // of floats, over the least step
+  const double least = kSpacing * least_step(scene, parameter);
+  const double step = power_of_two_below(parameter.natural_step);
+  return step >= least ? step : 2 * power_of_two_below(least);
+}
+
 }  // namespace limn

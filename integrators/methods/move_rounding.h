@@ -13,6 +13,10 @@ double least_step(const Scene& scene, const Parameter& parameter);
 // moves over its way. 0 if none of these moves.
 double rounding_of_moves(const Scene& scene, const Parameter& parameter, double step);
 
+// A power of two of at least the spacing of floats where they are widest, near the natural step:
+// floats hold positions that move by it.
+double resolved_step(const Scene& scene, const Parameter& parameter);
+
 double power_of_two_below(double step);
 
 }  // namespace limn

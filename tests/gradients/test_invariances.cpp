@@ -183,6 +183,17 @@ TEST(Place, DoesNotMatterToDifferences) {
             std::string::npos);
 }
 
+// Where they hold no natural step, differences take the least that moves anything, and say so.
+TEST(Place, FarDifferencesAreNotZero) {
+  const TempFiles files;
+  GradientOptions options;
+  options.method = "fd";
+  options.parameters = {"cube.translate.y"};
+  const GradientResult far = run_blocks(scene_at(files, {1e6, 1e6, 1e6}), options, 64, 1);
+  EXPECT_NE(far.parameters[0].image_sum.mean(0), 0);
+  EXPECT_EQ(far.warnings.size(), 1u);
+}
+
 // What lies beyond the far plane is not behind an edge either.
 TEST(FarPlane, HidesWhatIsBehindEdges) {
   const TempFiles files;
