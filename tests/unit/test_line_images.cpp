@@ -47,6 +47,7 @@ TEST(LineImages, AgreesWithRaysAndPaths) {
   }
 }
 
+// Images of silhouettes are those of lines.
 TEST(LineImages, ThreadsDoNotMatter) {
   const TempFiles files;
   const std::string lamp = square("lamp", 0.6, 90, {0.4, 2.9, 0.3}, area_light("glow", "9, 8, 7"));
@@ -57,6 +58,10 @@ TEST(LineImages, ThreadsDoNotMatter) {
       for (size_t i = 0; i < one.radiance.size(); ++i) {
         ASSERT_EQ(one.radiance.mean(i), three.radiance.mean(i)) << method;
       }
+    }
+    const RenderResult lines = run(scene, "lines", 3), own = run(scene, "silhouettes", 3);
+    for (size_t i = 0; i < lines.radiance.size(); ++i) {
+      ASSERT_EQ(own.radiance.mean(i), lines.radiance.mean(i));
     }
   }
 }

@@ -80,7 +80,8 @@ void OptionAdder::operator()(Method& method, const Option& option) const {
             check_task(method, task);
           },
           "Method: " + join(method_names(task)) + "; settings follow a colon, as in " +
-              (task == Task::kImage ? "silhouettes" : "forest") + ":width=4 (limn methods --all)")
+              (task == Task::kImage ? "lines:azimuths=uniform" : "forest:width=4") +
+              " (limn methods --all)")
       ->default_str(Method(task).name())
       ->type_name("NAME");
   const std::string instead =

@@ -45,8 +45,7 @@ struct RenderOptions {
   // silhouettes, lines: lines through the sky, 1 to 16384; a quarter of them through an emitter.
   // With a tolerance above 0 (at most 1) they, 8 at least, are doubled until two halves differ by
   // at most twice this part of the result, or until there are 16384, which RenderResult::warnings
-  // reports; what is left of the error is no longer without bias, and silhouettes takes lines
-  // everywhere. InputError for others.
+  // reports; what is left of the error is no longer without bias. InputError for others.
   int lines = 64;
   double tolerance = 0;
   int rays = 4;  // rays: of each point for each emitter and the sky, 1 to 2^20
