@@ -377,8 +377,9 @@ class Pilot {
     ReversePlan plan{std::move(chosen->estimator), ""};
     if (gains) plan.estimator->set_samples(best.samples);
     plan.decision = fmt::format(
-        "pilot of {} paths for each term: {} with {} numbers; squared error x work {:.3g} of that "
-        "of forest with the usual numbers, if its edges vary {:g} times what was seen",
+        "pilot of {} paths per term: {} with {} sample counts; expected squared error x work "
+        "{:.3g} "
+        "of that of forest with the usual counts, its edges' variance taken {:g} times as measured",
         kBatches * kPaths, plan.estimator->method_name(), gains ? "these" : "the usual",
         usual.product > 0 ? best.product / usual.product : 1.0, kUnseen);
     return plan;
@@ -486,8 +487,8 @@ ReversePlan planned(const Scene& scene, const Image& adjoint, const BackwardOpti
   if (!free) {
     ReversePlan plan = plain(without_pilot(options));
     if (chooses && !leaves_numbers(options)) {
-      plan.decision = fmt::format("no pilot, since numbers of samples are given: {}",
-                                  plan.estimator->method_name());
+      plan.decision =
+          fmt::format("no pilot, since sample counts are given: {}", plan.estimator->method_name());
     }
     return plan;
   }

@@ -23,10 +23,11 @@ BackwardOptions without_pilot(const BackwardOptions& options);
 
 // options: of the method `adaptive` or another; then, and where samples, terms or uniform pixels
 // are asked for, in runs too short for a pilot and where the scene has times, there is no pilot:
-// `adaptive` is `forest` then, or `silhouettes` where one of its own terms is asked for or a run is
-// too short. Pilots take an eighth of the shortest run that has one, about, or less. The plan
-// follows from the seed, and from whether the samples are enough for a pilot: with a limit of time,
-// which watch has run towards since the run began, settings are left that keep the run on one side.
+// `adaptive` is `forest` then, or `silhouettes` where one of its own terms is asked for, or where
+// a run is too short and the scene has light sets. Pilots take an eighth of the shortest run that
+// has one, about, or less. The plan follows from the seed, and from whether the samples are
+// enough for a pilot: with a limit of time, which watch has run towards since the run began,
+// settings are left that keep the run on one side.
 ReversePlan planned(const Scene& scene, const Image& adjoint, const BackwardOptions& options,
                     RunSettings& settings, const Stopwatch& watch);
 

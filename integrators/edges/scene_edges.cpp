@@ -193,10 +193,10 @@ void warn_of_contacts(const Scene& scene, const EdgeSamplerInput* edges,
   for (const ShapePair& pair : edges->parting) {
     if (pressed.count(pair) || ++reported > kMost) continue;
     warn(fmt::format(
-        "{} touch along an edge and move apart or through each other: there the image has a kink, "
-        "and the derivative is that beside a hair's gap between them, which may be the slope of "
-        "neither side (differences take the mean of both); farther apart, or moved together, there "
-        "is no kink",
+        "{} touch along an edge and move apart or through each other: there the image is not "
+        "differentiable; the derivative is that for an infinitesimal gap between them, which may "
+        "equal neither one-sided derivative (differences take the mean of both); move them apart, "
+        "or together",
         pair_in_text(scene, pair)));
   }
   if (reported > kMost)

@@ -211,9 +211,9 @@ void warn_of_faces_edge_on(const Scene& scene, const Viewpoints& viewpoints,
   const auto look = [&](const std::string& what, const Viewpoint& viewpoint) {
     if (viewpoint.flat_faces() == 0) return;
     warnings.push_back(fmt::format(
-        "{} lies in the plane of faces ({} of them, the first of {}): there the derivative has a "
-        "kink, and is that of the side from which such a face is not seen; differences take the "
-        "mean of both sides; a little off the plane there is no kink",
+        "{} lies in the plane of faces ({} of them, the first of {}): there the image is not "
+        "differentiable; the derivative is that of the side from which such a face is not seen; "
+        "differences take the mean of both sides; move it a little off the plane",
         what, viewpoint.flat_faces(), quoted_name(scene, viewpoint.first_shape())));
   };
   look("the camera", viewpoints.camera);

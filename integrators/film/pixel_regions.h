@@ -18,7 +18,7 @@ namespace limn {
 // How far regions reach beyond a pixel [pixels]: a step of their grid.
 inline constexpr double kPixelMargin = 0x1p-30;
 // What needs them, for messages.
-inline constexpr const char* kRegionsUser = "a film seen by its faces";
+inline constexpr const char* kRegionsUser = "points \"faces\"";
 
 class PixelRegions {
  public:

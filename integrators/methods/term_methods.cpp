@@ -142,7 +142,7 @@ std::vector<MethodType> term_methods() {
   for (MethodType& row : methods) {
     if (row.name == "forest") row.defaults = {Task::kFit};
     if (row.name != "silhouettes") continue;
-    row.description += "; images: as lines";
+    row.description += "; images: the same as lines";
     row.set_up = [gradients = row.set_up](MethodType& to) {
       gradients(to);
       to.image.reset();

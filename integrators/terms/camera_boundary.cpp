@@ -61,7 +61,8 @@ class CameraTerm final : public Term {
                                                 quoted_name(scene, second));
     warnings.push_back(fmt::format(
         "the camera sees {} in one line, one behind the other, and they move past each other: "
-        "where both are seen the derivative has a kink, and is that of a camera a little aside; "
+        "where both are seen the image is not differentiable; its derivative is that of a camera a "
+        "little aside; "
         "differences take the mean of both sides",
         whose));
   }

@@ -155,7 +155,7 @@ SHAPES = {
         "hidden_object", ["width=64", "height=48"], CREATURE, 150,
         "--spp 6 --remesh 50,100 --snapshots 25",
         {**seeds(SILHOUETTES),
-         "edges of forest": "--seed 1",
+         "edges of forest": "--method forest --seed 1",
          "uniform pixels": f"{SILHOUETTES} --seed 1 --pixels uniform",
          "no boundary": f"--seed 1 {NO_BOUNDARY}"}),
     "exact": Shape(
@@ -287,7 +287,7 @@ def tree(_):
     return Function("tree_shadow", ["object.rotate.y"], [TREE], {
         "lbfgs": (8, f"{NEWTON} --step 1.4"),
         "adam": (45, f"{FUNCTION} --optimiser adam --step 0.9 --step-half-life 12"),
-        "adam of forest": (60, "--spp 16 --step 0.9 --step-half-life 25 --seed 1"),
+        "adam of forest": (60, "--method forest --spp 16 --step 0.9 --step-half-life 25 --seed 1"),
     }, target=[f"turn={TREE}"])
 
 
@@ -295,7 +295,7 @@ def gears(_):
     return Function("gears", [f"gear_{i}.rotate.y" for i in range(len(GEARS))], [-a for a in GEARS], {
         "lbfgs": (28, f"{NEWTON} --step 1.8"),
         "adam": (80, f"{FUNCTION} --optimiser adam --step 1.4 --step-half-life 20"),
-        "adam of forest": (80, "--spp 16 --step 1.4 --step-half-life 20 --seed 1"),
+        "adam of forest": (80, "--method forest --spp 16 --step 1.4 --step-half-life 20 --seed 1"),
     }, start=[f"off_{i}={a}" for i, a in enumerate(GEARS)])
 
 
@@ -311,7 +311,7 @@ def displacement(fits):
     return Displacement("displacement", ["object.displacement"], moved, {
         "lbfgs": (40, f"--smoothing 0 {NEWTON} --step 1"),
         "adam": (100, f"--smoothing 0 {FUNCTION} --step 2 --step-half-life 30"),
-        "adam of forest": (100, "--smoothing 0 --spp 4 --step 2 --step-half-life 40 --seed 1"),
+        "adam of forest": (100, "--method forest --smoothing 0 --spp 4 --step 2 --step-half-life 40 --seed 1"),
     }, target=[f"mesh={os.path.abspath(file)}", "format=obj"], sensors=8)
 
 

@@ -152,7 +152,8 @@ void read_sampler(const ObjectDescription& object, const SceneDescription& descr
   DescribedProperties p(object, description, kNoMakers);
   if (object.type != "independent") {
     warnings.push_back(format_warning(
-        object.where, "sampler \"" + object.type + "\" is read as independent (see --generator)"));
+        object.where,
+        "sampler \"" + object.type + "\" is read as independent: limn chooses its own points"));
     p.boolean("jitter", true);
     p.integer("strength", 2);
   }

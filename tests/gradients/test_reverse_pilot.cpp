@@ -100,7 +100,7 @@ TEST(ReversePilot, SaysThatNumbersKeepItOff) {
   const auto decision = [&] {
     return backward(scene, wavy_adjoint(scene), options, settings).decision;
   };
-  EXPECT_EQ(decision(), "no pilot, since numbers of samples are given: forest");
+  EXPECT_EQ(decision(), "no pilot, since sample counts are given: forest");
   options.method = Method("forest");
   EXPECT_EQ(decision(), "");
 }

@@ -66,10 +66,10 @@ void print_verdict(const CheckResult& r, double seconds) {
     fmt::print("  NOT COMPLETE: no error was found, but terms are missing (see the warning)\n");
   } else if (r.bends) {
     fmt::print(
-        "  CANNOT TELL: the image bends here, as where shapes that touch part or a face is edge-on "
-        "to "
-        "a light:\n  the gradient is the slope on one side, and differences are the mean of "
-        "both\n");
+        "  CANNOT TELL: the image is not differentiable here, as where touching shapes separate or "
+        "a face is edge-on\n  to a light: the gradient is one-sided, differences are the mean of "
+        "both "
+        "sides\n");
   } else {
     fmt::print("  CANNOT TELL: an error of {} of all terms' magnitudes could have hidden: {}\n",
                percent(r.within), advice(r, seconds));
