@@ -47,7 +47,7 @@ RenderResult run(const Scene& scene, const std::string& method, int spp, RenderO
                  int threads) {
   RunSettings settings;
   settings.spp = spp;
-  settings.seed = method == "lines" ? 1 : method == "silhouettes" ? 3 : 2;
+  settings.seed = method == "lines" || method == "silhouettes" ? 1 : 2;
   settings.threads = threads;
   options.method = method;
   RenderResult result = render(scene, settings, options);
