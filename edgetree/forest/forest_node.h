@@ -20,7 +20,7 @@ enum class ForestGroup : uint8_t {
   kAlways,      // boundary, irregular and other edges: always candidates
 };
 inline constexpr int kForestGroups = 4;
-// Whether its edges may be folds: p sees both of their faces. Other candidates are silhouettes.
+// Whether p may see both faces of edges of the group (folds). Other candidates are silhouettes.
 constexpr bool has_folds(ForestGroup group) {
   return group == ForestGroup::kFront || group == ForestGroup::kFolds;
 }

@@ -62,7 +62,7 @@ std::vector<std::vector<double>> steps_and_changes(size_t steps) {
   return combinations;
 }
 
-// What the pilot tries: steps at which floats move as they should.
+// The steps that the pilot tries: rounding changes what they move by kMostRounding at most.
 std::vector<double> steps_to_try(const Scene& scene, const Parameter& parameter) {
   std::vector<double> steps;
   for (int k = kTrials - 1; k >= 0; --k) {

@@ -11,8 +11,8 @@ namespace {
 // error of kRounding of it.
 constexpr double kLeastMove = 0x1p-14, kRounding = 0x1p-10;
 
-// The same of texels, where the fastest decide: radiance is linear in them, so that a step too
-// large for others does no harm.
+// The least step of texels. The fastest texel decides: radiance is linear in texels, so a step that
+// is too large for others does no harm.
 double least_texel_step(const Scene& scene, const Parameter& parameter) {
   const Image velocities = parameter.texel_velocities(scene);
   if (velocities.data.empty()) return 0;

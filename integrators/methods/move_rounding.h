@@ -1,5 +1,5 @@
 #pragma once
-// What rounding moved positions and texels to float does to differences.
+// The error of differences that comes from rounding moved positions and texels to float.
 #include "limn/core/parameter.h"
 #include "limn/core/scene.h"
 

@@ -33,7 +33,7 @@ class VisibilityEstimator final : public SampleEstimator {
   int64_t missed() const { return lines_ ? lines_->missed() : 0; }
 
  private:
-  // What of the light has points of the film of its own.
+  // Which part of the light a point of the film is for: emitters and sky may have their own points.
   enum class Source { kAll, kEmitters, kSky = 3 };  // as numbers, of streams of random numbers
   struct Look {
     Source source;

@@ -78,10 +78,11 @@ constexpr int kMostInPixel = 64;        // not tuned
 // A plan whose product is this close to the best has counts that are large enough. Short samples
 // leave less behind when a run is stopped.
 constexpr double kRounding = 1.1;
-// The same of terms of the film once the others are chosen. They are stratified over a batch, so
-// that more of them at once leave less than their variances say. Against 1.1, squared error times
-// time is 0.6 (a cube under a spot), 0.7 (a small light), 0.83 (demo), 0.85 (plant), 1.14 (a fence)
-// and 1.16 (a glass pane; without the noisiest hundredth of pixels 0.95 and 1).
+// The same for terms of the film, once the other counts are chosen. Their samples are stratified
+// over a batch, so that more of them at once leave less variance than the pilot's figures say.
+// Against 1.1, squared error times time is 0.6 (a cube under a spot), 0.7 (a small light), 0.83
+// (demo), 0.85 (plant), 1.14 (a fence) and 1.16 (a glass pane; without the noisiest hundredth of
+// pixels 0.95 and 1).
 constexpr double kFilmRounding = 1.03;
 
 // Counts before rounding, up to a common factor; empty for a term of the film.

@@ -211,7 +211,8 @@ class Fitter {
     }
   }
 
-  // Of all parameters, with windows of one size: the cross-validated variance of every cell.
+  // By parameter and cell: the variance that fits leave, by cross-validation, with windows of one
+  // size.
   std::vector<std::vector<double>> left_by(int radius) const {
     std::vector<std::vector<double>> left(parameters_, std::vector<double>(grid_.size()));
     parallel_for(grid_.rows, threads_, [&](size_t y) {

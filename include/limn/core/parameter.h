@@ -5,7 +5,7 @@
 //   SHAPE.rotate.x|y|z            radians, world axes through its pivot: the center of its bounds
 //                                 as it was read, moved along by translations
 //   SHAPE.scale                   factor - 1 of the size as it was read, about the pivot; in fits
-//                                 not below -0.99
+//                                 that size stays at least 0.01
 //   SHAPE.vertex_positions        scene units: an array, the V by 3 coordinates of its vertices
 //   SHAPE.vertex_positions.V.x|y|z  one of them: vertex V (from 0) with its copies
 //   SHAPE.vertex_positions:FILE   moves every vertex by the parameter times its vector in FILE

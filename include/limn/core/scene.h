@@ -25,10 +25,10 @@ enum class ShadingModel {
 
 struct Exposure;  // exposure.h
 
-// What rotations and scales of a shape go about, and what scales are in units of.
+// The fixed point of a shape's rotations and scales, and the shape's size.
 struct Pivot {
   Vec3d center;     // world space
-  double size = 1;  // over that of the start
+  double size = 1;  // over the size as it was read, which is the unit of scales
 };
 
 struct Shape {

@@ -21,8 +21,8 @@
 
 namespace limn {
 
-// What becomes of a gradient g, in natural steps: Parameter::natural_step; of what moves a shape,
-// what moves its fastest vertex by 1 % of the diagonal.
+// What becomes of a gradient g. Numbers are in natural steps: for a parameter that moves a shape, the
+// step that moves its fastest vertex by 1 % of the diagonal; else Parameter::natural_step.
 enum class OptimiserKind {
   kAdamUniform,      // Adam, but all vertices of a shape share the largest second moment, so that
                      // steps keep the gradient's direction (Nicolet et al. 2021, Sec. 3.4)
@@ -66,8 +66,8 @@ struct FitOptions {
   LossKind loss = LossKind::kL2;
   int pyramid = 1;  // levels of image_loss()
   OptimiserKind optimiser = OptimiserKind::kAdamUniform;
-  // Of the first step, in natural steps: what moves a shape's fastest vertex by 1 % of a diagonal,
-  // 0.01 radians of the camera, 1 % of a value.
+  // Length of the first step, in natural steps: a shape's fastest vertex moves by 1 % of its
+  // diagonal, the camera turns by 0.01 radians, a value changes by 1 %.
   double step = 1;
   int step_half_life = 0;  // after so many steps a step is half as long; 0: all are alike
   int spp_doubling = 0;    // after so many steps there are twice the samples; 0: always as many

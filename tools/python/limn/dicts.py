@@ -347,8 +347,8 @@ def load_dict(scene: Mapping[str, Any], folder: str = "") -> Scene:
     ("ball.bsdf.reflectance"), unless they say "id". {"type": "ref", "id": ...} names one that stands
     before. {"type": "mesh", "vertices": (V, 3), "faces": (F, 3)} is a shape of arrays, with the
     attributes of write_ply ("vertex_color", ...); with a "filename" in their place it is one of a
-    file, of STL, glTF and other formats if trimesh is installed. Files are looked for in `folder`. Raises limn.InputError with the place:
-    dict.ball.bsdf.
+    file, of STL, glTF and other formats if trimesh is installed. Files are looked for in `folder`.
+    Raises limn.InputError with the place: dict.ball.bsdf.
     """
     if not isinstance(scene, Mapping) or scene.get("type") != "scene":
         raise InputError('dict: error: expected {"type": "scene", ...}')
