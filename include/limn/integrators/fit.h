@@ -21,8 +21,8 @@
 
 namespace limn {
 
-// What becomes of a gradient g. Numbers are in natural steps: for a parameter that moves a shape, the
-// step that moves its fastest vertex by 1 % of the diagonal; else Parameter::natural_step.
+// What becomes of a gradient g. Numbers are in natural steps: for a parameter that moves a shape,
+// the step that moves its fastest vertex by 1 % of the diagonal; else Parameter::natural_step.
 enum class OptimiserKind {
   kAdamUniform,      // Adam, but all vertices of a shape share the largest second moment, so that
                      // steps keep the gradient's direction (Nicolet et al. 2021, Sec. 3.4)
