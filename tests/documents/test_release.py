@@ -7,6 +7,7 @@ import os
 import random
 import subprocess
 import sys
+import tempfile
 import unittest
 from importlib.machinery import SourceFileLoader
 from importlib.util import module_from_spec, spec_from_loader
@@ -121,12 +122,46 @@ class Help(unittest.TestCase):
             self.assertIn(argument, done.stderr)
 
 
+def script(name):
+    """A file of tools as a module."""
+    loader = SourceFileLoader(name, os.path.join(TOOLS, name))
+    module = module_from_spec(spec_from_loader(name, loader))
+    loader.exec_module(module)
+    return module
+
+
 class History(unittest.TestCase):
     def test_a_commit_that_the_repository_lacks_has_no_subject(self):
-        loader = SourceFileLoader("history", os.path.join(TOOLS, "history"))
-        history = module_from_spec(spec_from_loader("history", loader))
-        loader.exec_module(history)
-        self.assertEqual(history.subject_of("123456789abc-dirty"), "")
+        self.assertEqual(script("history").subject_of("123456789abc-dirty"), "")
+
+
+class Stale(unittest.TestCase):
+    def test_figures_of_an_earlier_build_are_made_again(self):
+        release = script("release")
+        for steps in (release.STEPS, release.SHORT):
+            calls = [c for c in steps["figures"].split(" && ") if c.startswith("tools/paper")]
+            self.assertTrue(calls)
+            self.assertEqual([c for c in calls if "--again" not in c.split()], [])
+
+    def test_words_do_not_make_figures_young(self):
+        release = script("release")
+        release.FIGURES, release.CODE = ["page.md"], ["code"]
+        with tempfile.TemporaryDirectory() as release.ROOT:
+            def commit(name, text):
+                with open(os.path.join(release.ROOT, name), "w", encoding="utf-8") as stream:
+                    stream.write(text)
+                release.git("add", name)
+                release.git("-c", "user.name=a", "-c", "user.email=a@b", "commit", "-m", name)
+
+            release.git("init", "--quiet")
+            commit("page.md", "In 2 scenes:\n\n| scene | time |\n|---|---|\n| plant | 0.5 |\n")
+            self.assertEqual(list(release.stale_figures()), [])
+            commit("code", "faster")
+            commit("page.md", "Of 2 scenes:\n\n| scene | time |\n|---|---|\n| plant | 0.5 |\n")
+            (line,) = release.stale_figures()
+            self.assertTrue(line.startswith("page.md: 1 commits changed code"), line)
+            commit("page.md", "In 2 scenes:\n\n| scene | time |\n|---|---|\n| plant | 0.4 |\n")
+            self.assertEqual(list(release.stale_figures()), [])
 
 
 if __name__ == "__main__":
