@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "limn/core/bounds.h"
 
@@ -41,6 +42,26 @@ std::array<Vec3d, 2> across(const Vec3d& n) {
 // Where a far light's highlight looks the same from, over the height of the point, the origin.
 Vec3d start_of(const MirroredLight::Highlight& highlight) {
   return highlight.toward * ((1 - highlight.nearness) / -dot(highlight.toward, highlight.normal));
+}
+
+// The place in a flat part, a ball around this center, that a point sees brightest, about. shown:
+// where a perfect mirror in its plane would show the light; foot: of the point on the plane. Half
+// vectors of what lies between them are tilted towards or away from the light alone.
+Vec3d place_in(const Vec3d& center, double radius, const Vec3d& shown, const Vec3d& foot) {
+  if (length(shown - center) <= radius) return shown;
+  const Vec3d line = shown - foot;
+  const double along = dot(center - foot, line) / length_squared(line);
+  const Vec3d x = foot + line * std::clamp(along, 0.0, 1.0), off = x - center;
+  return length(off) <= radius ? x : center + normalize(off) * radius;
+}
+
+// As wide as the lobe of a mirror that shows light as wide as both sides of a plate do that passes
+// it.
+double passed_width(const Bsdf* bsdf) {
+  if (!bsdf || !bsdf->lobes().below) return 1;
+  const Vec3d n{0, 0, 1};
+  const LobeSummary lobe = bsdf->passed_lobe(n, n, nullptr).lobe;
+  return std::numbers::sqrt2 * bsdf->eta() * lobe.model->width(lobe);
 }
 
 // 1 - cos(angle).
@@ -135,12 +156,13 @@ std::unique_ptr<MirroredLight> MirroredLight::make(const Scene& scene, const Lig
   const auto narrow = [](const Bsdf* bsdf) {
     return bsdf && bsdf->lobe().model->width(bsdf->lobe()) < kWidest;
   };
-  const auto may_mirror = [&](const Shape& shape) {
+  const auto may_show = [&](const Shape& shape) {
     return shape.mesh.faces.size() <= kMostFaces &&  // others have no flat_parts()
-           (narrow(shape.bsdf->side(true)) || narrow(shape.bsdf->side(false)));
+           (narrow(shape.bsdf->side(true)) || narrow(shape.bsdf->side(false)) ||
+            passed_width(shape.bsdf->side(true)) < kWidest);
   };
   if (scene.max_depth == 1 || scene.max_depth == 2 ||
-      std::none_of(scene.shapes.begin(), scene.shapes.end(), may_mirror)) {
+      std::none_of(scene.shapes.begin(), scene.shapes.end(), may_show)) {
     return nullptr;
   }
   std::unique_ptr<MirroredLight> result(new MirroredLight(scene, lights));
@@ -148,13 +170,28 @@ std::unique_ptr<MirroredLight> MirroredLight::make(const Scene& scene, const Lig
   if (sources.empty()) return nullptr;
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
     const Shape& shape = scene.shapes[s];
-    if (!may_mirror(shape)) continue;
-    for (const FlatPart& part : flat_parts(shape.mesh, ShapeId(s))) {
+    if (!may_show(shape)) continue;
+    const std::vector<FlatPart> parts = flat_parts(shape.mesh, ShapeId(s));
+    for (const FlatPart& part : parts) {
       for (const bool front : {true, false}) {
         const Bsdf* bsdf = shape.bsdf->side(front);
         if (!narrow(bsdf)) continue;
         for (const Image& source : sources) {
           result->add(part, *bsdf, front ? part.normal : -part.normal, source);
+        }
+      }
+      const auto is_opposite = [&](const FlatPart& other) {
+        return dot(other.normal, part.normal) < kFlat - 1;
+      };
+      const Bsdf* bsdf = shape.bsdf->side(true);
+      if (passed_width(bsdf) < kWidest && std::ranges::any_of(parts, is_opposite)) {
+        for (Image source : sources) {  // where a mirror would show its mirror image
+          const Vec3d& n = part.normal;
+          const Vec3d to = source.infinite ? source.light : source.light - part.bounds.center();
+          source.light = source.light - n * (2 * dot(to, n));
+          source.width = passed_width(bsdf);
+          source.turn = 4 * source.width;
+          result->add(part, *bsdf, n, source);
         }
       }
     }
@@ -222,12 +259,8 @@ void MirroredLight::add(const FlatPart& part, const Bsdf& bsdf, const Vec3d& nor
   const double height = dot(to, normal);
   if (!(height > kLeastHeight * (image.infinite ? 1 : image.radius))) return;
   image.albedo = std::min(bsdf.lobe().albedo, 1.0);
-  image.width = bsdf.lobe().model->width(bsdf.lobe());
-  if (image.infinite) {
-    const double spread = spread_of(2 * image.width, image.size);
-    image.turn = std::sin(spread);
-    image.rest = std::cos(spread);
-  }
+  if (image.turn == 0) image.width = bsdf.lobe().model->width(bsdf.lobe());
+  if (image.infinite) image.rest = std::cos(spread_of(image.width, 0.5 * image.size));
   if (image.emitter) image.irradiance = lights_.estimate(*image.emitter, image.center);
   image.light_in_part = image.irradiance * height / length(to) * image.radius * image.radius;
   images_.push_back(image);
@@ -247,47 +280,36 @@ bool MirroredLight::sees(const Image& image, const Vec3d& p, Highlight& highligh
   const Vec3d& n = image.normal;
   const double height = dot(p - image.center, n);
   if (!(height > kInPlane * image.radius)) return false;
-  double size = image.size;  // of the light, as the angle that its mirror image has from p
-  if (image.infinite) {
-    highlight.light = image.light;
-    highlight.nearness = 1;
-    highlight.toward = image.light - n * (2 * dot(image.light, n));
-  } else {
-    const double emitter_height = dot(image.light - image.center, n);
-    const Vec3d to = image.light - n * (2 * emitter_height) - p;
-    const double distance = length(to);
-    highlight.toward = to / distance;
-    highlight.light = highlight.toward - n * (2 * dot(highlight.toward, n));
-    highlight.nearness = emitter_height / (emitter_height + height);
-    size /= distance;
-  }
+  const Vec3d foot = p - n * height;
+  const Vec3d to = image.infinite ? image.light : image.light - foot;
+  const double fall = image.infinite ? height / dot(to, n) : height / (height + dot(to, n));
+  const Vec3d shown = foot + (to - n * dot(to, n)) * fall;
+  const Vec3d x = place_in(image.center, image.radius, shown, foot);
+  const double a = length(x - p), b = image.infinite ? 0 : length(image.light - x);
+  highlight.toward = (x - p) / a;
+  highlight.light = image.infinite ? image.light : (image.light - x) / b;
+  highlight.nearness = image.infinite ? 1 : b / (a + b);
+  // Of the light, as the angle that its mirror image has from p.
+  const double size = image.infinite ? image.size : image.size / (a + b);
+  // Nothing of it is bright where the half vector is tilted by more.
+  const Vec3d half = highlight.light - highlight.toward;
+  const double rest = image.infinite
+                          ? image.rest
+                          : std::cos(spread_of(image.width, 0.5 * size / highlight.nearness));
+  if (dot(half, n) < rest * length(half)) return false;
   // A half vector that turns turns what is mirrored twice as far.
   const double lobe = 2 * image.width * highlight.nearness;
-  const double spread = spread_of(lobe, size);
-  const auto hit_of = [&](const Vec3d& w) { return p + w * (height / -dot(w, n)); };
-  const Vec3d shown = hit_of(highlight.toward);
-  const auto is_inside = [&](const Vec3d& x) { return length(x - image.center) <= image.radius; };
-  if (!is_inside(shown)) {
-    // The steepest direction in which it is still bright.
-    const double sine = -dot(highlight.toward, n);
-    const double turn = image.infinite ? image.turn : std::sin(spread);
-    const double rest = image.infinite ? image.rest : std::cos(spread);
-    const Vec3d along = highlight.toward + n * sine;
-    const double cosine = length(along);
-    const double level = cosine * rest - sine * turn;
-    const Vec3d steep =
-        level > 0 ? along * (level / cosine) - n * (sine * rest + cosine * turn) : -n;
-    if (!is_inside(hit_of(steep))) return false;
-  }
   highlight.bsdf = image.bsdf;
   highlight.normal = n;
   highlight.depth = height + kFlat * image.radius;
   highlight.half_angle = 2 * lobe + size;
   // Where the light is wider than the lobe, its image is about as wide as the light.
-  highlight.cone = lobe < 2 * size ? versine(std::max(spread, kLeastCone)) : 0;
-  highlight.irradiance =
-      image.albedo * highlight.nearness * highlight.nearness *
-      (image.emitter ? lights_.estimate(*image.emitter, shown) : image.irradiance);
+  const double cone = spread_of(std::max(lobe, image.turn * highlight.nearness), size);
+  const bool even = image.turn > 0 || lobe < 2 * size;
+  highlight.cone = even ? versine(std::max(cone, kLeastCone)) : 0;
+  if (highlight.cone > 0) highlight.toward = normalize(shown - p);
+  highlight.irradiance = image.albedo * highlight.nearness * highlight.nearness *
+                         (image.emitter ? lights_.estimate(*image.emitter, x) : image.irradiance);
   return true;
 }
 

@@ -4,9 +4,9 @@
 // once in a hundred samples, and each is then a hundred times as bright as the rest: they ruled the
 // squared error of whole images. Scattering functions are reciprocal, so the directions of the
 // highlight are those into which the floor scatters the light; where it is far away they are the
-// same from all points, and a near emitter is seen as a far one would be from a nearer point. So a
-// share of a vertex's directions is drawn from there: a mixture of densities, which changes no
-// mean.
+// same from all points, and a near emitter is seen as a far one would be from a nearer point. A
+// plate of rough glass shows a light straight behind it. So a share of a vertex's directions is
+// drawn from there: a mixture of densities, which changes no mean.
 #include <algorithm>
 #include <array>
 #include <bitset>
@@ -33,7 +33,7 @@ class MirroredLight {
   struct Highlight {
     const Bsdf* bsdf;  // of the surface
     Vec3d normal;      // unit, of its lit side
-    Vec3d light;       // unit, from where a perfect mirror would show it towards the light
+    Vec3d light;       // unit, from where it is best seen towards the light; through glass mirrored
     Vec3d toward;      // unit, from the point to there
     double depth;      // that what lies behind the surface's plane has from the point, along it
     double nearness;  // how far a far light's highlight would be seen from, over the distance there
@@ -119,9 +119,9 @@ class MirroredLight {
     double radius = 0;
     double width = 0, albedo = 0;  // of the lobe
     bool infinite = false;         // the light is
-    double turn = 0, rest = 1;     // sine and cosine of its spread (`sees`), if it is
-    Vec3d light;                   // its center, or the unit direction towards it
-    double size = 0;  // radius of a sphere around it; at infinity the sine of its angle
+    double turn = 0, rest = 1;  // of a plate's cone [rad], 0: a mirror; cosine of the tilt (`sees`)
+    Vec3d light;                // its center, or the unit direction towards it
+    double size = 0;            // radius of a sphere around it; at infinity the sine of its angle
     std::optional<size_t> emitter;  // which of all lights it is; none: a patch
     double irradiance = 0;          // across it, at the part's center
     double light_in_part = 0;       // how much of it falls on the part

@@ -48,6 +48,12 @@ std::string lamp_in_sky(double radius) {
   return lamp + constant_light("sky", "0.2, 0.3, 0.4");
 }
 
+std::string bulb(const Vec3d& p, double intensity) {
+  return fmt::format(R"(<emitter type="point"><point name="position" value="{}, {}, {}"/>
+                        <rgb name="intensity" value="{}"/></emitter>)",
+                     p.x, p.y, p.z, intensity);
+}
+
 // What shines: the sun in a map, of this radius in degrees, or a lamp of this radius.
 std::string light_of(const TempFiles& files, double sun, double lamp) {
   return sun > 0 ? sun_in_sky(files, sun) : lamp_in_sky(lamp);
@@ -137,36 +143,90 @@ TEST(MirroredLight, DrawsFromItsDensity) {
   }
 }
 
-// Radiance from points of the wall with and without: the same mean, and squares that are ruled no
-// more by paths that meet the highlight by chance.
+// Radiance from points of a surface without and with: the same mean. place: where a ray in this
+// direction starts, from two uniform numbers. Returns the mean squares.
+template <class Place>
+std::array<RunningMean, 2> squares_by_mixture(const Scene& scene, int samples, const Place& place,
+                                              const Vec3d& direction) {
+  const auto tracer = make_embree_tracer(scene, 1);
+  const Lights lights(scene);
+  const auto mirrored = MirroredLight::make(scene, lights);
+  EXPECT_TRUE(mirrored);
+  std::array<RunningMean, 2> means, squares;
+  Rng rng(5, 0, 0);
+  for (int i = 0; i < samples; ++i) {
+    const double u = rng.uniform(), v = rng.uniform();
+    const Point at(scene, *tracer, place(u, v), direction);
+    for (const bool on : {false, true}) {
+      const PathContext context{scene,   *tracer, lights,
+                                nullptr, nullptr, on ? mirrored.get() : nullptr};
+      RayCount rays;
+      PathTracer<double, NoVisitor> paths(context, rays);
+      Walk<double, NoVisitor> walk(Rng(7, static_cast<uint64_t>(i), on), 0, nullptr);
+      paths.place(walk, at.surface, at.wi);
+      paths.follow_one(walk);
+      const double value = walk.radiance().g;
+      means[on].add(value);
+      squares[on].add(value * value);
+    }
+  }
+  const double error = std::hypot(means[0].standard_error(), means[1].standard_error());
+  EXPECT_LT(std::fabs(means[0].mean() - means[1].mean()), 4.5 * error);
+  fmt::print("mean square {:.3g} +- {:.2g}, without {:.3g} +- {:.2g}\n", squares[1].mean(),
+             squares[1].standard_error(), squares[0].mean(), squares[0].standard_error());
+  return squares;
+}
+
+// Squares are ruled no more by paths that meet the highlight by chance.
 TEST(MirroredLight, ChangesNoMean) {
   const TempFiles files;
   for (const auto& [alpha, sun, lamp, highlight] : kCases) {
     const Scene scene = scene_with(files, alpha, sun, lamp);
-    const auto tracer = make_embree_tracer(scene, 1);
-    const Lights lights(scene);
-    const auto mirrored = MirroredLight::make(scene, lights);
-    RunningMean means[2], squares[2];
-    Rng rng(5, 0, 0);
-    for (int i = 0; i < 200000; ++i) {
-      const Point at(scene, *tracer, {1.6 * rng.uniform() - 0.8, 0.2 + 1.6 * rng.uniform(), 0.9},
-                     {0, 0, -1});
-      for (const bool on : {false, true}) {
-        const PathContext context{scene,   *tracer, lights,
-                                  nullptr, nullptr, on ? mirrored.get() : nullptr};
-        RayCount rays;
-        PathTracer<double, NoVisitor> paths(context, rays);
-        Walk<double, NoVisitor> walk(Rng(7, static_cast<uint64_t>(i), on), 0, nullptr);
-        paths.place(walk, at.surface, at.wi);
-        paths.follow_one(walk);
-        const double value = walk.radiance().g;
-        means[on].add(value);
-        squares[on].add(value * value);
-      }
-    }
-    const double error = std::hypot(means[0].standard_error(), means[1].standard_error());
-    EXPECT_LT(std::fabs(means[0].mean() - means[1].mean()), 4.5 * error) << alpha;
+    const auto wall = [](double u, double v) { return Vec3d{1.6 * u - 0.8, 0.2 + 1.6 * v, 0.9}; };
+    const auto squares = squares_by_mixture(scene, 200000, wall, {0, 0, -1});
     EXPECT_LT(squares[1].mean() + 3 * squares[1].standard_error(), squares[0].mean()) << alpha;
+  }
+}
+
+// A floor and a box of these half sizes.
+Scene over_floor_with(const TempFiles& files, const Vec3d& half, const Vec3d& center,
+                      const std::string& bsdf, const std::string& light) {
+  SceneParts parts;
+  parts.max_depth = 4;
+  Mesh box = cube_mesh();
+  for (Vec3f& p : box.positions)
+    p = cast<float>(center + Vec3d{half.x * p.x, half.y * p.y, half.z * p.z});
+  parts.body = square("floor", 3, -90, {0, 0, 0}, diffuse("paint", "0.7, 0.7, 0.7")) +
+               obj_shape("box", write_mesh(files, "box.obj", make_mesh(box.positions, box.faces)),
+                         true, 1, {0, 0, 0}, bsdf) +
+               light;
+  return make_scene(files, parts);
+}
+
+// A floor beside a glossy box sees a grazing highlight in its side, although the plane of that
+// would show the light itself far over it.
+TEST(MirroredLight, GrazingHighlightBesideTheMirrorImage) {
+  const TempFiles files;
+  const Scene scene = over_floor_with(files, {0.6, 0.1, 0.42}, {0, 0.2, 0},
+                                      conductor("gloss", 0.16), bulb({0.714, 3.036, 0.109}, 16));
+  const auto beside = [](double u, double v) { return Vec3d{0.62 + 0.1 * u, 0.05, 0.8 * v - 0.4}; };
+  const auto squares = squares_by_mixture(scene, 100000, beside, {0, -1, 0});
+  // Most of the squares is direct light; rare ones rule their error.
+  EXPECT_LT(5 * squares[1].standard_error(), squares[0].standard_error());
+}
+
+// A floor sees a lamp through a plate of rough glass.
+TEST(MirroredLight, RoughGlassShowsLights) {
+  const TempFiles files;
+  const std::string glass = R"(<bsdf type="roughdielectric"><float name="alpha" value="0.25"/>
+                               <float name="int_ior" value="1.3"/></bsdf>)";
+  for (const std::string& light :
+       {bulb({-0.2, 2.7, -0.4}, 6),
+        square("lamp", 0.14, 90, {-0.2, 2.7, -0.4}, area_light("glow", "60, 50, 40"))}) {
+    const Scene scene = over_floor_with(files, {0.6, 0.01, 0.42}, {0, 0.06, 0}, glass, light);
+    const auto below = [](double u, double v) { return Vec3d{u - 0.5, 0.04, 0.6 * v - 0.3}; };
+    const auto squares = squares_by_mixture(scene, 100000, below, {0, -1, 0});
+    EXPECT_LT(4 * squares[1].mean(), squares[0].mean());
   }
 }
 
@@ -480,12 +540,6 @@ struct WallPoint {
   std::unique_ptr<MirroredLight> mirrored;
   MirroredLight::Mixture mixture;
 };
-
-std::string bulb(const Vec3d& p, double intensity) {
-  return fmt::format(R"(<emitter type="point"><point name="position" value="{}, {}, {}"/>
-                        <rgb name="intensity" value="{}"/></emitter>)",
-                     p.x, p.y, p.z, intensity);
-}
 
 std::string spot(const Vec3d& p, const Vec3d& target, double cutoff, double intensity) {
   return fmt::format(
