@@ -48,6 +48,29 @@ def test_they_are_read_and_set(folder, sky):
     assert scene.parameters["sky.data.4.7.b"].shape == ()
 
 
+# With an envmap in the scene and without one.
+@pytest.mark.parametrize("map", [None, np.full(SHAPE, 3, np.float32)])
+def test_textures_and_attributes_are_read_and_set(map):
+    rng = np.random.default_rng(6)
+    texels, colours = rng.random((4, 6, 3)).astype(np.float32), rng.random((4, 3))
+    scene = limn.load_dict({
+        "type": "scene", "sensor": {"type": "perspective"},
+        "sky": {"type": "constant"} if map is None else {"type": "envmap", "bitmap": map},
+        "wall": {"type": "rectangle", "bsdf": {"type": "diffuse", "reflectance": {
+            "type": "bitmap", "bitmap": texels, "raw": True}}},
+        "roof": {"type": "mesh", "vertices": [[-1, 0, 2], [1, 0, 2], [1, 2, 2], [-1, 2, 2]],
+                 "faces": [[0, 1, 2], [0, 2, 3]], "vertex_color": colours,
+                 "bsdf": {"type": "diffuse", "reflectance": {
+                     "type": "mesh_attribute", "name": "vertex_color"}}}})
+    for name, values in (("wall.bsdf.reflectance.data", texels),
+                         ("roof.vertex_color", colours[None].astype(np.float32))):
+        assert same(scene[name], values)
+        scene[name] = values / 2
+        assert same(scene[name], values / 2)
+    with pytest.raises(limn.InputError, match='"roof.translate.x" is one number, not 3'):
+        scene["roof.translate.x"] = [1, 2, 3]
+
+
 # Two sides, 5 sigma.
 def test_reverse_is_forward_and_the_programs(folder, sky):
     scene, texels = sky

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "limn/core/error.h"
+#include "limn/core/texel_map.h"
 #include "tools/python/bindings.h"
 
 namespace limn::python {
@@ -42,7 +43,7 @@ nb::object value_of(const ParameterView& view) {
   if (view.moved) return nb::cast(*view.moved);
   if (const auto shape = shape_of(view)) return nb::cast(view_positions(view.scene, *shape));
   if (view.parameter.array.size() == 3) {
-    return nb::cast(to_array(view.scene->environment->texels()));
+    return nb::cast(to_array(view.parameter.texel_map(*view.scene)->texels()));
   }
   const std::vector<double> value = view.parameter.value(*view.scene);
   if (value.empty()) return nb::none();
@@ -80,7 +81,11 @@ void assign(SceneHandle& scene, const std::string& name, nb::handle value) {
     check_shape(view, nb::ndarray<const double, nb::c_contig>(array));
     parameter = view.parameter;
   }
-  if (moved && numbers.size() == 1) {
+  if (moved) {
+    if (numbers.size() != 1) {
+      throw InputError({scene.get().file}, fmt::format("parameter \"{}\" is one number, not {}",
+                                                       parameter.name, numbers.size()));
+    }
     parameter.move_checked(scene.edit(), numbers[0] - *moved);
     scene.moved[parameter.name] = numbers[0];
     return;
@@ -132,7 +137,7 @@ void bind_parameter(nb::module_& m) {
       .def_prop_ro("shape", shape_tuple, nb::sig("def shape(self) -> tuple[int, ...]"),
                    "Of limn.backward's derivative: () for a number, (3,) for a colour, (V, 3) for "
                    "vertex positions, (V,) for displacements, (H, W, 3) for the texels of an "
-                   "envmap. In limn.gradient all "
+                   "envmap or bitmap, (1, N, 3) for an attribute of a mesh. In limn.gradient all "
                    "channels of a colour move alike (grey), and "
                    "NAME.r, NAME.g, NAME.b move one of them.")
       .def_prop_ro(
