@@ -15,13 +15,13 @@ namespace {
 class Motions {
  public:
   explicit Motions(const Mesh& mesh) : mesh_(mesh), diagonal_(bounds_of(mesh).diagonal()) {
-    for (const Vec3<Lanes>& v : mesh.position_tangents)
+    for (const Vec3<Lanes> v : mesh.position_tangents)
       for (int k = 0; k < 3; ++k)
         for (int i = 0; i < kLanes; ++i) speeds_[i] = std::max(speeds_[i], std::fabs(v[k][i]));
   }
 
   bool are_alike(VertexId u, VertexId v) const {
-    const Vec3<Lanes>&a = tangent(u), &b = tangent(v);
+    const Vec3<Lanes> a = tangent(u), b = tangent(v);
     const double apart = length(position(u) - position(v));
     for (int i = 0; i < kLanes; ++i) {
       double size = 0, difference = 0;
@@ -39,7 +39,7 @@ class Motions {
   }
 
  private:
-  const Vec3<Lanes>& tangent(VertexId v) const { return mesh_.position_tangents[v.index()]; }
+  Vec3<Lanes> tangent(VertexId v) const { return mesh_.position_tangents[v.index()]; }
   Vec3d position(VertexId v) const { return cast<double>(mesh_.positions[v.index()]); }
 
   const Mesh& mesh_;
@@ -144,7 +144,7 @@ class SliverLines {
 
 std::vector<VertexId> edge_vertex_ids(const Mesh& mesh) {
   std::vector<VertexId> ids(mesh.weld.begin(), mesh.weld.end());
-  if (mesh.position_tangents.empty()) return ids;
+  if (mesh.position_tangents.all_alike()) return ids;
   const Motions motions(mesh);
   std::unordered_map<uint32_t, std::vector<VertexId>> torn;  // weld: further representatives
   for (uint32_t v = 0; v < ids.size(); ++v) {

@@ -138,7 +138,7 @@ class Unifier {
 
   void find_speeds() {
     for (const TouchingShape& shape : shapes_)
-      for (const Vec3<Lanes>& v : shape.mesh->position_tangents)
+      for (const Vec3<Lanes> v : shape.mesh->position_tangents)
         for (int k = 0; k < 3; ++k)
           for (int i = 0; i < kLanes; ++i) speeds_[i] = std::max(speeds_[i], std::fabs(v[k][i]));
   }

@@ -38,24 +38,6 @@ std::optional<ForestGroup> group_of(const EdgeMesh& mesh, const Edge& edge, bool
   }
 }
 
-Wedge wedge_of(const EdgeMesh& mesh, EdgeId id) {
-  const Edge& edge = mesh.edge(id);
-  const auto [a, b] = edge.vertices;
-  Wedge wedge;
-  wedge.planes[0] = mesh.plane(edge.faces[0]);
-  wedge.planes[1] = edge.faces[1].valid() ? mesh.plane(edge.faces[1]) : wedge.planes[0];
-  wedge.ends = {mesh.position(a), mesh.position(b)};
-  wedge.length = length(wedge.ends[1] - wedge.ends[0]);
-  const Vec3d &n0 = wedge.planes[0].n, &n1 = wedge.planes[1].n;
-  wedge.angle = std::atan2(length(cross(n0, n1)), dot(n0, n1));
-  wedge.edge = id;
-  if (edge.edge_class == EdgeClass::kSharp && std::isfinite(mesh.fold_contrast)) {
-    wedge.fold =
-        std::clamp(2 * std::tan(0.5 * wedge.angle) * mesh.fold_contrast, double{kLeastFold}, 1.0);
-  }
-  return wedge;
-}
-
 Bounds bounds_of(std::span<const Wedge> wedges) {
   Bounds bounds;
   for (const Wedge& wedge : wedges)
@@ -130,17 +112,25 @@ struct TreeKind {
   float fold = 1;  // see NodeHead
 };
 
-// Fills the nodes of one tree independently. ids: of the tree's nodes in the forest. below: the
+// Fills the nodes of one tree, in one thread. ids: of the tree's nodes in the forest. below: the
 // trees for which the wedges stand, or none.
 class TreeFiller {
  public:
-  TreeFiller(const ForestShape& tree, std::span<const NodeId> ids, std::span<const Wedge> wedges,
+  TreeFiller(const ForestShape& tree, std::span<const NodeId> ids, const WedgeList& list,
              std::span<const NodeId> below, const TreeKind& kind, const ForestConfig& config)
-      : tree_(tree), ids_(ids), wedges_(wedges), below_(below), kind_(kind), config_(config) {}
+      : tree_(tree),
+        ids_(ids),
+        list_(list),
+        window_(list),
+        below_(below),
+        kind_(kind),
+        config_(config) {}
 
-  void fill(uint32_t index, Forest& forest) const {
+  void fill(uint32_t index, Forest& forest) {
     const SplitNode<kWidth>& split = tree_.nodes[index];
-    const NodeFrame frame = frame_of(bounds_of(edges(split.range)));
+    const bool small = split.range.size() <= kWindow;
+    const NodeFrame frame =
+        frame_of(small ? bounds_of(edges(split.range)) : list_.bounds(split.range));
     if (ids_[index] < 0) {
       EdgeNode& node = forest.edges[~ids_[index]];
       fill_head(frame, node.head);
@@ -153,9 +143,10 @@ class TreeFiller {
   }
 
  private:
-  std::span<const Wedge> edges(EdgeRange range) const {
-    return wedges_.subspan(range.begin, range.size());
-  }
+  // Of so many edges the whole wedges are made once for all nodes above them.
+  static constexpr uint32_t kWindow = 4096;  // not tuned
+
+  std::span<const Wedge> edges(EdgeRange range) { return window_.wedges(range); }
 
   // All fields but the parent.
   void fill_head(const NodeFrame& frame, NodeHead& head) const {
@@ -177,8 +168,7 @@ class TreeFiller {
     return fit_dual(rest, frame, config_);
   }
 
-  void fill_children(const SplitNode<kWidth>& split, const NodeFrame& frame,
-                     InnerNode& node) const {
+  void fill_children(const SplitNode<kWidth>& split, const NodeFrame& frame, InnerNode& node) {
     node.child = Ints{} + kNoChild;
     const double scale = frame.inverse_radius * frame.inverse_radius;
     for (int lane = 0; lane < kWidth; ++lane) {
@@ -195,7 +185,7 @@ class TreeFiller {
     }
   }
 
-  void fill_edges(const SplitNode<kWidth>& split, const NodeFrame& frame, EdgeNode& node) const {
+  void fill_edges(const SplitNode<kWidth>& split, const NodeFrame& frame, EdgeNode& node) {
     node.edge = Ints{} + kNoChild;
     const double scale = frame.inverse_radius * frame.inverse_radius;
     for (int lane = 0; lane < kWidth; ++lane) {
@@ -213,7 +203,8 @@ class TreeFiller {
 
   const ForestShape& tree_;
   std::span<const NodeId> ids_;
-  std::span<const Wedge> wedges_;
+  const WedgeList& list_;
+  WedgeWindow window_;
   std::span<const NodeId> below_;
   TreeKind kind_;
   const ForestConfig& config_;
@@ -266,32 +257,18 @@ void link(std::span<const NodeId> ids, Forest& forest) {
     }
 }
 
-// Moves wedges[order[i]] to place i, without a copy of all: they are most of the memory of a build.
-void put_in_order(std::vector<uint32_t> order, std::span<Wedge> wedges) {
-  for (uint32_t i = 0; i < order.size(); ++i) {
-    const Wedge first = wedges[i];
-    uint32_t to = i;
-    for (uint32_t from; (from = order[to]) != i; to = from) {
-      wedges[to] = wedges[from];
-      order[to] = to;
-    }
-    wedges[to] = first;
-    order[to] = to;
-  }
-}
-
 // Appends a tree over wedges, which it reorders, or above the trees for which they stand. Returns
 // its root.
-NodeId append_tree(std::span<Wedge> wedges, std::span<const NodeId> trees, const TreeKind& kind,
+NodeId append_tree(WedgeList& list, std::span<const NodeId> trees, const TreeKind& kind,
                    int threads, const ForestConfig& config, Forest& forest) {
-  ForestShape tree = split_edges(wedges, config.width, threads);
+  ForestShape tree = split_edges(list, config.width, threads);
   std::vector<NodeId> below(trees.size());
   for (size_t i = 0; i < below.size(); ++i) below[i] = trees[tree.order[i]];
-  put_in_order(std::move(tree.order), wedges);
+  list.put_in_order(std::move(tree.order));
   const std::vector<NodeId> ids = append_nodes(tree, trees.empty(), forest);
-  const TreeFiller filler(tree, ids, wedges, below, kind, config);
   constexpr size_t kBlock = 64;  // nodes; not tuned
   parallel_for((tree.nodes.size() + kBlock - 1) / kBlock, threads, [&](size_t block) {
+    TreeFiller filler(tree, ids, list, below, kind, config);
     const size_t end = std::min(tree.nodes.size(), kBlock * (block + 1));
     for (size_t i = kBlock * block; i < end; ++i) filler.fill(static_cast<uint32_t>(i), forest);
   });
@@ -310,10 +287,10 @@ double speed_of(const EdgeMesh& mesh, VertexId vertex, const Lanes& scale,
 }
 
 void set_speeds(const EdgeMesh& mesh, const Lanes& scale, const ObjectMotion& motion,
-                std::span<Wedge> wedges) {
-  for (Wedge& wedge : wedges) {
-    const auto [a, b] = mesh.edge(wedge.edge).vertices;
-    wedge.speed = 0.5 * (speed_of(mesh, a, scale, motion) + speed_of(mesh, b, scale, motion));
+                WedgeList& list) {
+  for (size_t i = 0; i < list.size(); ++i) {
+    const auto [a, b] = mesh.edge(list.edge(i)).vertices;
+    list.set_speed(i, 0.5 * (speed_of(mesh, a, scale, motion) + speed_of(mesh, b, scale, motion)));
   }
 }
 
@@ -332,12 +309,13 @@ double expected_length(const Wedge& wedge, ForestGroup group) {
 }
 
 // A wedge that stands for a tree: its box is the tree's, its speed that of the edges themselves.
-Wedge stand_in(std::span<const Wedge> wedges, ForestGroup group, const ObjectMotion& motion) {
-  const Bounds box = bounds_of(wedges);
+Wedge stand_in(const WedgeList& list, ForestGroup group, const ObjectMotion& motion) {
+  const Bounds box = list.bounds();
   Wedge whole;
   whole.ends = {box.lower, box.upper};
   double length = 0;
-  for (const Wedge& wedge : wedges) {
+  for (size_t i = 0; i < list.size(); ++i) {
+    const Wedge wedge = list[i];
     const Vec3d middle = (wedge.ends[0] + wedge.ends[1]) * 0.5;
     const double speed = wedge.speed > 0 ? wedge.speed + sum_of_speeds(motion.velocity(middle)) : 0;
     whole.length += expected_length(wedge, group);
@@ -388,7 +366,8 @@ void append_roots(std::span<const Tree> all, int kind, int threads, const Forest
     stand_ins.push_back(trees[i]->stand_in);
   }
   const TreeKind tree{forest.head(below[0]).object, 0, ForestGroup::kAlways};
-  forest.roots.push_back(append_tree(stand_ins, below, tree, threads, config, forest));
+  WedgeList list(std::move(stand_ins));
+  forest.roots.push_back(append_tree(list, below, tree, threads, config, forest));
 }
 void append_roots(std::span<const Tree> trees, int threads, const ForestConfig& config,
                   Forest& forest) {
@@ -410,23 +389,33 @@ uint32_t append_motion(const EdgeMesh& mesh, const Lanes& lane_scale, Forest& fo
   return static_cast<uint32_t>(forest.motions.size() - 1);
 }
 
+// Nodes have six to seven edges, and three to four children. An array that grew would double for
+// the few nodes of a small shape behind a large one; what is reserved and not used takes no memory.
+void reserve_nodes(const EdgeSamplerInput& input, Forest& forest) {
+  size_t edges = 0;
+  for (const EdgeMesh& mesh : input.objects) edges += mesh.edges.size();
+  forest.edges.reserve(edges / 6 + input.objects.size());
+  forest.inner.reserve(edges / 20 + input.objects.size());
+}
+
 }  // namespace
 
 Forest build_forest(const EdgeSamplerInput& input, int threads, const ForestConfig& config) {
   Forest forest;
+  reserve_nodes(input, forest);
   forest.motions.emplace_back();
   std::vector<uint32_t> motions;
   for (const EdgeMesh& mesh : input.objects)
     motions.push_back(append_motion(mesh, input.lane_scale, forest));
   std::vector<Tree> trees;
   for_every_tree(input, config.cull_concave, forest,
-                 [&](auto& wedges, ShapeId object, ForestGroup group) {
+                 [&](WedgeList& list, ShapeId object, ForestGroup group) {
                    const EdgeMesh& mesh = input.object(object);
                    const TreeKind kind{object, motions[object.index()], group, mesh.fold_contrast};
                    const ObjectMotion motion = forest.motions[kind.motion];
-                   set_speeds(mesh, input.lane_scale, motion, wedges);
-                   const Wedge whole = stand_in(wedges, group, motion);
-                   const NodeId root = append_tree(wedges, {}, kind, threads, config, forest);
+                   set_speeds(mesh, input.lane_scale, motion, list);
+                   const Wedge whole = stand_in(list, group, motion);
+                   const NodeId root = append_tree(list, {}, kind, threads, config, forest);
                    trees.push_back(tree_of(root, whole, mesh.of_texture(), forest));
                  });
   append_roots(trees, threads, config, forest);

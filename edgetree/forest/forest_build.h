@@ -8,6 +8,7 @@
 #include "edgetree/bounds/forest_config.h"
 #include "edgetree/bounds/forest_fit.h"
 #include "edgetree/forest/forest_node.h"
+#include "edgetree/forest/wedge_list.h"
 #include "limn/core/bounds.h"
 #include "limn/edgetree/edge_sampler.h"
 
@@ -15,10 +16,8 @@ namespace limn {
 
 // The group of an edge; nothing if no query needs the edge.
 std::optional<ForestGroup> group_of(const EdgeMesh& mesh, const Edge& edge, bool cull_concave);
-// The wedge of an edge, without its speed.
-Wedge wedge_of(const EdgeMesh& mesh, EdgeId id);
 Bounds bounds_of(std::span<const Wedge> wedges);
-// Calls append(wedges, object, group) for every object and group with edges, in a fixed order,
+// Calls append(list, object, group) for every object and group with edges, in a fixed order,
 // after giving `trees` (Forest, QuadricForest) a slot for every edge.
 template <class Trees, class Append>
 void for_every_tree(const EdgeSamplerInput& input, bool cull_concave, Trees& trees,
@@ -31,15 +30,15 @@ void for_every_tree(const EdgeSamplerInput& input, bool cull_concave, Trees& tre
     for (const Edge& edge : mesh.edges) {
       if (const auto group = group_of(mesh, edge, cull_concave)) ++counts[static_cast<int>(*group)];
     }
-    std::vector<Wedge> groups[kForestGroups];
+    std::vector<WedgeList> groups(kForestGroups, WedgeList(mesh));
     for (int g = 0; g < kForestGroups; ++g) groups[g].reserve(counts[g]);
     for (uint32_t e = 0; e < mesh.edges.size(); ++e) {
       if (const auto group = group_of(mesh, mesh.edges[e], cull_concave)) {
-        groups[static_cast<int>(*group)].push_back(wedge_of(mesh, EdgeId(e)));
+        groups[static_cast<int>(*group)].add(EdgeId(e));
       }
     }
     for (int g = 0; g < kForestGroups; ++g) {
-      if (!groups[g].empty()) append(groups[g], ShapeId(o), static_cast<ForestGroup>(g));
+      if (groups[g].size() > 0) append(groups[g], ShapeId(o), static_cast<ForestGroup>(g));
     }
   }
 }

@@ -213,15 +213,13 @@ class Splitter {
   uint32_t width_;
 };
 
-std::vector<Item> items_of(std::span<const Wedge> wedges) {
-  Bounds bounds;
-  for (const Wedge& wedge : wedges)
-    for (const Vec3d& x : wedge.ends) bounds.extend(x);
+std::vector<Item> items_of(const WedgeList& list) {
+  const Bounds bounds = list.bounds();
   const Vec3d center = bounds.center();
   const double diagonal = bounds.diagonal(), scale = diagonal > 0 ? 2 / diagonal : 1;
-  std::vector<Item> items(wedges.size());
+  std::vector<Item> items(list.size());
   for (uint32_t i = 0; i < items.size(); ++i) {
-    const Wedge& wedge = wedges[i];
+    const Wedge wedge = list[i];
     const Vec3d x = ((wedge.ends[0] + wedge.ends[1]) * 0.5 - center) * scale;
     const Vec3d n = (wedge.planes[0].n + wedge.planes[1].n) * 0.5;
     for (int k = 0; k < 3; ++k) {
@@ -235,8 +233,8 @@ std::vector<Item> items_of(std::span<const Wedge> wedges) {
 
 }  // namespace
 
-ForestShape split_edges(std::span<const Wedge> wedges, uint32_t width, int threads) {
-  std::vector<Item> items = items_of(wedges);
+ForestShape split_edges(const WedgeList& list, uint32_t width, int threads) {
+  std::vector<Item> items = items_of(list);
   ForestShape tree =
       split_tree<kWidth>(static_cast<uint32_t>(items.size()), threads, Splitter(items, width));
   for (const Item& item : items) tree.order.push_back(item.wedge());

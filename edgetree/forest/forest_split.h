@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <span>
 
-#include "edgetree/bounds/forest_fit.h"
 #include "edgetree/bounds/split_tree.h"
+#include "edgetree/forest/wedge_list.h"
 #include "edgetree/simd.h"
 
 namespace limn {
@@ -13,7 +13,7 @@ namespace limn {
 // each.
 using ForestShape = SplitTree<kWidth>;
 
-// wedges: at least one. width: 2 to kWidth.
-ForestShape split_edges(std::span<const Wedge> wedges, uint32_t width, int threads);
+// list: at least one wedge. width: 2 to kWidth.
+ForestShape split_edges(const WedgeList& list, uint32_t width, int threads);
 
 }  // namespace limn

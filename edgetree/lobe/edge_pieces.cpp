@@ -45,11 +45,8 @@ class EdgeCutter {
 // Prefetches the mesh data that `add` reads.
 void fetch(const ListedEdge& edge, const EdgeMesh& mesh) {
   if (mesh.tangents.empty()) return;
-  for (const VertexId vertex : mesh.edge(edge.id.edge).vertices) {
-    const char* tangent = reinterpret_cast<const char*>(&mesh.tangent(vertex));
-    __builtin_prefetch(tangent);
-    __builtin_prefetch(tangent + sizeof(Vec3<Lanes>) - 1);
-  }
+  for (const VertexId vertex : mesh.edge(edge.id.edge).vertices)
+    mesh.tangents.fetch(vertex.index());
 }
 
 EdgeCutter::EdgeCutter(const EdgeQuery& query, const Lanes& lane_scale)

@@ -191,8 +191,10 @@ void link(std::span<const NodeId> ids, QuadricForest& forest) {
     }
 }
 
-void append_tree(std::span<const Wedge> wedges, ShapeId object, ForestGroup group, int threads,
+void append_tree(const WedgeList& list, ShapeId object, ForestGroup group, int threads,
                  const QuadricConfig& config, QuadricForest& forest) {
+  WedgeWindow window(list);
+  const std::span<const Wedge> wedges = window.wedges({0, static_cast<uint32_t>(list.size())});
   const QuadricShape shape = shape_of(wedges, threads);
   std::vector<Wedge> sorted(wedges.size());
   for (size_t i = 0; i < wedges.size(); ++i) sorted[i] = wedges[shape.order[i]];
@@ -214,8 +216,8 @@ QuadricForest build_quadric_forest(const EdgeSamplerInput& input, int threads,
                                    const QuadricConfig& config) {
   QuadricForest forest;
   for_every_tree(input, config.cull_concave, forest,
-                 [&](auto& wedges, ShapeId object, ForestGroup group) {
-                   append_tree(wedges, object, group, threads, config, forest);
+                 [&](const WedgeList& list, ShapeId object, ForestGroup group) {
+                   append_tree(list, object, group, threads, config, forest);
                  });
   return forest;
 }

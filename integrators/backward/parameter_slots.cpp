@@ -191,7 +191,7 @@ ParameterSlots::Dependence ParameterSlots::dependence_of(const Scene& scene,
     Scene copy = deep_copy(scene);
     parameter.seed(copy, 0);
     if (time_) set_time(copy, *time_);
-    for (const Vec3<Lanes>& d : copy.shapes[s].mesh.normal_tangents) {
+    for (const Vec3<Lanes> d : copy.shapes[s].mesh.normal_tangents) {
       dependence.normal_velocity.push_back({d.x[0], d.y[0], d.z[0]});
     }
     break;
@@ -206,7 +206,7 @@ std::vector<Vec3d> ParameterSlots::velocities_now(const Scene& scene, const Para
   parameter.seed(copy, 0);
   set_time(copy, *time_);
   std::vector<Vec3d> velocities;
-  for (const Vec3<Lanes>& d : copy.shapes[shape].mesh.position_tangents) {
+  for (const Vec3<Lanes> d : copy.shapes[shape].mesh.position_tangents) {
     velocities.push_back({d.x[0], d.y[0], d.z[0]});
   }
   return velocities;

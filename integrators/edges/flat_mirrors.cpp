@@ -61,7 +61,7 @@ struct Scale {
     Bounds bounds;
     for (const Vec3f& p : mesh.positions) bounds.extend(cast<double>(p));
     length = bounds.diagonal();
-    for (const Vec3<Lanes>& v : mesh.position_tangents) {
+    for (const Vec3<Lanes> v : mesh.position_tangents) {
       for (int k = 0; k < kLanes; ++k) {
         speed[k] = std::max(speed[k], std::hypot(v.x[k], v.y[k], v.z[k]));
       }

@@ -37,8 +37,16 @@ class Hash {
   }
   template <class T>
   void add(const std::vector<T>& values) {
+    add_all(values);
+  }
+  template <class T>
+  void add(const SharedVector<T>& values) {
+    add_all(values);
+  }
+  template <class Values>
+  void add_all(const Values& values) {
     add(uint64_t{values.size()});
-    for (const T& v : values) add(v);
+    for (const auto& v : values) add(v);
   }
   // Its kind and the values of its parameters.
   template <class T>

@@ -4,6 +4,7 @@
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
 #include <algorithm>
+#include <span>
 #include <utility>
 
 #include "limn/core/check.h"
@@ -30,7 +31,7 @@ std::vector<double> numbers(const Matrix& x) {
 
 // Pairs of welded vertices, each once, in order; welded: what stands for each vertex.
 std::vector<std::pair<uint32_t, uint32_t>> edges_of(const Mesh& mesh,
-                                                    const std::vector<uint32_t>& welded) {
+                                                    std::span<const uint32_t> welded) {
   std::vector<std::pair<uint32_t, uint32_t>> edges;
   for (const FaceIndices& face : mesh.faces) {
     for (int k = 0; k < 3; ++k) {

@@ -70,7 +70,7 @@ inline void PathTracer<S, Visitor>::fetch_corners(const Walk& walk) const {
   for (const uint32_t vertex : mesh.face(face.face)) {
     __builtin_prefetch(&mesh.positions[vertex]);
     if constexpr (!kPlain) {
-      if (!mesh.position_tangents.empty()) __builtin_prefetch(&mesh.position_tangents[vertex]);
+      if (!mesh.position_tangents.empty()) mesh.position_tangents.fetch(vertex);
     }
   }
   if (mesh.normal_source != NormalSource::kFace) detail::fetch_shading<Place>(mesh, face.face);

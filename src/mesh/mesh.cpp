@@ -2,7 +2,6 @@
 #include "limn/core/mesh.h"
 
 #include <algorithm>
-#include <cstring>
 #include <numeric>
 #include <tuple>
 
@@ -17,7 +16,7 @@ namespace limn {
 Vec3<Dual> Mesh::position(VertexId id) const {
   const Vec3d p = cast<double>(positions[id.index()]);
   if (position_tangents.empty()) return {p.x, p.y, p.z};
-  const Vec3<Lanes>& t = position_tangents[id.index()];
+  const Vec3<Lanes> t = position_tangents[id.index()];
   return {{p.x, t.x}, {p.y, t.y}, {p.z, t.z}};
 }
 
@@ -98,16 +97,6 @@ std::vector<Vec3<S>> computed_normals(const Mesh& mesh, const std::vector<FaceSh
   return normals;
 }
 
-// True if all vertices have the same velocity, bit for bit. Then all derivatives of normals are
-// zero.
-bool moves_as_one(const Mesh& mesh) {
-  const auto& tangents = mesh.position_tangents;
-  const auto alike = [&](const Vec3<Lanes>& t) {
-    return std::memcmp(&t, &tangents[0], sizeof(t)) == 0;
-  };
-  return std::all_of(tangents.begin(), tangents.end(), alike);
-}
-
 }  // namespace
 
 void update_shading_normals(Mesh& mesh) { fill_shading_normals(mesh); }
@@ -127,7 +116,8 @@ void update_shading_tangents(Mesh& mesh) {
   update_u_tangents(mesh);
   if (mesh.normal_source != NormalSource::kComputed) return;
   mesh.normal_tangents.clear();
-  if (moves_as_one(mesh)) return;
+  if (mesh.position_tangents.all_alike()) return;  // then all derivatives of normals are zero
+  mesh.normal_tangents.reserve(mesh.normals.size());
   size_t cancelled = 0;
   for (const Vec3<Dual>& n : computed_normals(mesh, face_shapes<Dual>(mesh), cancelled)) {
     mesh.normal_tangents.push_back({n.x.d, n.y.d, n.z.d});

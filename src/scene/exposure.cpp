@@ -130,17 +130,22 @@ void carry(Mesh& mesh, const Carrier& carrier) {
     if (mesh.normal_source == NormalSource::kGiven)
       mesh.normal_tangents.resize(mesh.normals.size());
   }
+  Tangents positions, normals;
+  positions.reserve(mesh.positions.size());
+  normals.reserve(mesh.normals.size());
   for (size_t i = 0; i < mesh.positions.size(); ++i) {
     const Vec3d y = carrier.at().point(cast<double>(mesh.positions[i]));
     mesh.positions[i] = cast<float>(y);
-    if (mesh.position_tangents.empty()) continue;
-    mesh.position_tangents[i] = carrier.tangent(y, mesh.position_tangents[i]);
+    if (!mesh.position_tangents.empty())
+      positions.push_back(carrier.tangent(y, mesh.position_tangents[i]));
   }
   for (size_t i = 0; i < mesh.normals.size() && mesh.normal_source == NormalSource::kGiven; ++i) {
     mesh.normals[i] = carrier.at().rotation.vector(mesh.normals[i]);
-    if (mesh.normal_tangents.empty()) continue;
-    mesh.normal_tangents[i] = carrier.unit_tangent(mesh.normals[i], mesh.normal_tangents[i]);
+    if (!mesh.normal_tangents.empty())
+      normals.push_back(carrier.unit_tangent(mesh.normals[i], mesh.normal_tangents[i]));
   }
+  mesh.position_tangents = std::move(positions);
+  if (mesh.normal_source == NormalSource::kGiven) mesh.normal_tangents = std::move(normals);
   if (!mesh.positions.empty()) update_shading_normals(mesh);
 }
 

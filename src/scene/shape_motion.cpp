@@ -16,12 +16,15 @@ namespace {
 // A fit must not shrink a shape to a point, from which no step would recover.
 constexpr double kLeastScale = 0.01;  // not tuned
 
-void add_to_lane(std::vector<Vec3<Lanes>>& tangents, int lane,
-                 const std::vector<Vec3d>& velocities) {
-  tangents.resize(velocities.size());
+void add_to_lane(Tangents& tangents, int lane, const std::vector<Vec3d>& velocities) {
+  Tangents sums;
+  sums.reserve(velocities.size());
   for (size_t i = 0; i < velocities.size(); ++i) {
-    for (int k = 0; k < 3; ++k) tangents[i][k][lane] += velocities[i][k];
+    Vec3<Lanes> sum = i < tangents.size() ? tangents[i] : Vec3<Lanes>{};
+    for (int k = 0; k < 3; ++k) sum[k][lane] += velocities[i][k];
+    sums.push_back(sum);
   }
+  tangents = std::move(sums);
 }
 
 // Linear motion that leaves normals from the file unchanged; subclasses override.
@@ -58,7 +61,7 @@ class ShapeMotion : public Motion {
   virtual void seed_given_normals(Mesh&, int /*lane*/) const {}
   virtual void move_vertices(Shape& shape, double step, size_t component) const {
     const std::vector<Vec3d> velocities = vertex_velocities(shape, component);
-    std::vector<Vec3f>& positions = shape.mesh.positions;
+    SharedVector<Vec3f>& positions = shape.mesh.positions;
     for (size_t i = 0; i < positions.size(); ++i) {
       positions[i] = cast<float>(cast<double>(positions[i]) + velocities[i] * step);
     }

@@ -221,13 +221,6 @@ class SurfaceGradient final : public OfFace {
   std::shared_ptr<Texture> heights_;
 };
 
-bool moves_as_one(const Mesh& mesh) {
-  const auto& tangents = mesh.position_tangents;
-  return std::all_of(tangents.begin(), tangents.end(), [&](const Vec3<Lanes>& t) {
-    return std::memcmp(&t, &tangents[0], sizeof(t)) == 0;
-  });
-}
-
 }  // namespace
 
 std::shared_ptr<Texture> make_tangent() { return std::make_shared<Tangent>(); }
@@ -246,7 +239,7 @@ void update_u_directions(Mesh& mesh) {
 
 void update_u_tangents(Mesh& mesh) {
   mesh.u_tangents.clear();
-  if (!mesh.has_tangents || moves_as_one(mesh)) return;
+  if (!mesh.has_tangents || mesh.position_tangents.all_alike()) return;
   for (const Vec3<Dual>& v : sums<Dual>(mesh)) mesh.u_tangents.push_back({v.x.d, v.y.d, v.z.d});
 }
 

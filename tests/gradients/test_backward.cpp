@@ -214,7 +214,7 @@ void expect_same_interior(const Scene& scene, const std::string& sampler = "fore
   for (const Shape& shape : scene.shapes) {
     if (shape.id.empty()) continue;
     const Moments& all = reverse.of(shape.id + ".displacement").moments;
-    const std::vector<uint32_t>& weld = shape.mesh.weld;
+    const SharedVector<uint32_t>& weld = shape.mesh.weld;
     double sum = 0, magnitude = 0;
     for (size_t v = 0; v < weld.size(); ++v) {
       if (weld[v] == weld[1]) sum += all.mean(v);

@@ -228,7 +228,7 @@ TEST(TextureEdges, MoveWithTheirFaces) {
   const FaceSegment segment{FaceId(0), {0.3, 0.1}, {0.1, 0.7}};
   const EdgeMesh edges = texture_edges(mesh, build_edge_mesh(mesh, true), true, {&segment, 1});
   // Exactly: relative to what moves along they are at rest.
-  for (const Vec3<Lanes>& tangent : edges.tangents) {
+  for (const Vec3<Lanes> tangent : edges.tangents) {
     for (int k = 0; k < kLanes; ++k) {
       EXPECT_EQ(tangent.x[k], v.x[k]);
       EXPECT_EQ(tangent.z[k], v.z[k]);

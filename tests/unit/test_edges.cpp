@@ -237,7 +237,8 @@ TEST(Edges, TornSeamsHaveTwoRims) {
   Mesh mesh = seam_split(grid_mesh(1));  // two triangles, three vertices each
   mesh.position_tangents.assign(6, {});
   EXPECT_EQ(counts_of(build_edge_mesh(mesh, true)), (Counts{4, 0, 0, 0, 1}));
-  for (int v = 0; v < 6; ++v) mesh.position_tangents[v].x = Lanes{1, 0, 0, v < 3 ? 0.0 : 2.0};
+  for (int v = 0; v < 6; ++v)
+    mesh.position_tangents.set(v, {Lanes{1, 0, 0, v < 3 ? 0.0 : 2.0}, {}, {}});
   const EdgeMesh torn = build_edge_mesh(mesh, true);
   EXPECT_EQ(counts_of(torn), (Counts{6, 0, 0, 0, 0}));
   for (const Edge& e : torn.edges)

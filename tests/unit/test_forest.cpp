@@ -478,7 +478,8 @@ TEST(Forest, KeepsMotionThatIsNotLinear) {
   for (const double bent : {0.0, 0.1, 10.0}) {
     EdgeSamplerInput input = linearly_moving_torus(rng);
     EdgeMesh& mesh = input.objects[0];
-    for (Vec3<Lanes>& v : mesh.tangents) v = v + random_velocity(rng) * bent;
+    for (size_t v = 0; v < mesh.tangents.size(); ++v)
+      mesh.tangents.set(v, mesh.tangents[v] + random_velocity(rng) * bent);
     const Forest forest = build_forest(input, 1, {});
     const ObjectMotion& motion = forest.motions[forest.head(forest.roots[0]).motion];
     EXPECT_EQ(sum_of_speeds(motion.at_center) > 0, bent < 1);
@@ -499,8 +500,7 @@ TEST(Forest, KeepsMotionThatIsNotLinear) {
 // that know come nearer to those by exact weights.
 TEST(Forest, WeighsMotionAcrossTheLineOfSight) {
   Mesh torus = with_smooth_normals(torus_mesh(48, 24));
-  torus.position_tangents.assign(torus.positions.size(), {});
-  for (Vec3<Lanes>& v : torus.position_tangents) v.x[0] = 1;
+  torus.position_tangents.assign(torus.positions.size(), {{1, 0, 0, 0}, {}, {}});
   const EdgeSamplerInput input{{build_edge_mesh(torus, true)}};
   const auto across = EdgeForest::build(input, 1),
              any = EdgeForest::build(input, 1, {.normal_speed = false});
@@ -536,7 +536,8 @@ TEST(Forest, WeighsThinObjectsByWhatTheyMove) {
     for (Vec3f& x : ring.positions) x = {x.x + 2 * side, x.y, x.z * kThin};
     ring.position_tangents.assign(ring.positions.size(), {});
     for (size_t v = 0; v < ring.positions.size(); ++v)
-      ring.position_tangents[v].z[0] = side < 0 ? double{ring.positions[v].z} / kThin : 1;
+      ring.position_tangents.set(
+          v, {{}, {}, {side < 0 ? double{ring.positions[v].z} / kThin : 1, 0, 0, 0}});
     input.objects.push_back(build_edge_mesh(ring, true));
   }
   const auto forest = EdgeForest::build(input, 1);

@@ -161,7 +161,8 @@ TEST(Normals, TangentsMatchDifferences) {
   const Mesh up = moved(h), down = moved(-h);
   mesh.position_tangents.resize(5);
   for (int i = 0; i < 5; ++i) {
-    for (int k = 0; k < 3; ++k) mesh.position_tangents[i][k][1] = velocity[i][k];
+    mesh.position_tangents.set(
+        i, {{0, velocity[i][0], 0, 0}, {0, velocity[i][1], 0, 0}, {0, velocity[i][2], 0, 0}});
   }
   update_shading_normals(mesh);
   // Truncation h^2 times third derivatives of order 10, rounding of positions 2^-24 over h.
@@ -210,12 +211,13 @@ TEST(Normals, CancelledOnesAreFinite) {
   mesh.normal_source = NormalSource::kComputed;
   Rng rng(1, 2, 3);
   for (size_t v = 0; v < x.size(); ++v) {
-    mesh.position_tangents.emplace_back();
-    for (int k = 0; k < 3; ++k) mesh.position_tangents[v][k][0] = rng.uniform();
+    Vec3<Lanes> velocity;
+    for (int k = 0; k < 3; ++k) velocity[k][0] = rng.uniform();
+    mesh.position_tangents.push_back(velocity);
   }
   update_shading_normals(mesh);
   // Faces are 1 high at least, and corners move at sqrt(3) at most: none turns faster than this.
-  for (const Vec3<Lanes>& n : mesh.normal_tangents)
+  for (const Vec3<Lanes> n : mesh.normal_tangents)
     EXPECT_LT(length(Vec3d{n.x[0], n.y[0], n.z[0]}), 4 * std::sqrt(3));
   for (const Vec3d& n : mesh.normals) EXPECT_NEAR(length(n), 1, 1e-15);
 }

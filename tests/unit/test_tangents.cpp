@@ -75,7 +75,8 @@ TEST(Tangents, DerivativesMatchDifferences) {
   const Mesh up = moved(h), down = moved(-h);
   mesh.position_tangents.resize(5);
   for (int i = 0; i < 5; ++i) {
-    for (int k = 0; k < 3; ++k) mesh.position_tangents[i][k][1] = velocity[i][k];
+    mesh.position_tangents.set(
+        i, {{0, velocity[i][0], 0, 0}, {0, velocity[i][1], 0, 0}, {0, velocity[i][2], 0, 0}});
   }
   update_shading_normals(mesh);
   ASSERT_EQ(mesh.u_tangents.size(), mesh.u_directions.size());
@@ -104,7 +105,7 @@ TEST(Tangents, AdjointIsTheTranspose) {
   }
   update_u_tangents(mesh);
   double forward = 0;
-  for (const Vec3<Lanes>& t : mesh.u_tangents) {
+  for (const Vec3<Lanes> t : mesh.u_tangents) {
     of_directions.push_back(random_vector());
     const Vec3d& w = of_directions.back();
     forward += w.x * t.x[0] + w.y * t.y[0] + w.z * t.z[0];

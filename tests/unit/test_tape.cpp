@@ -197,7 +197,7 @@ void expect_normals(Mesh mesh, Rng& rng) {
   update_shading_normals(mesh);
   std::vector<Vec3d> of_normals, of_positions(mesh.positions.size());
   double forward = 0;
-  for (const Vec3<Lanes>& n : mesh.normal_tangents) {
+  for (const Vec3<Lanes> n : mesh.normal_tangents) {
     const Vec3d w = random_vector(rng);
     of_normals.push_back(w);
     forward += w.x * n.x[0] + w.y * n.y[0] + w.z * n.z[0];

@@ -212,7 +212,7 @@ TEST(Touching, WhatMovesApartKeepsBothRims) {
   for (Mesh& tile : tiles) tile.position_tangents.assign(4, {});
   const auto irregular = [&] { return count(united(tiles), EdgeClass::kIrregular); };
   EXPECT_EQ(irregular(), 0u);
-  for (auto& v : tiles[1].position_tangents) v.z[2] = 1;
+  tiles[1].position_tangents.assign(4, {{}, {}, {0, 0, 1, 0}});
   EXPECT_EQ(irregular(), 2u);
   const auto objects = united(tiles);
   for (const EdgeMesh& mesh : objects)
@@ -223,7 +223,7 @@ TEST(Touching, WhatMovesApartKeepsBothRims) {
       EXPECT_NE(around.incidence(0).motion_group, around.incidence(1).motion_group);
       EXPECT_EQ(around.incidence(0).motion_group, mesh.edges[e].motion_group);
     }
-  for (auto& v : tiles[0].position_tangents) v.z[2] = 1;
+  tiles[0].position_tangents.assign(4, {{}, {}, {0, 0, 1, 0}});
   EXPECT_EQ(irregular(), 0u);
 }
 
@@ -255,7 +255,9 @@ TEST(Touching, TJunctionsFarAwayDoNotTear) {
     EXPECT_NEAR(length_with(objects, 1), 6, 1e-4);  // its outline
     EXPECT_EQ(length_with(objects, 2) + length_with(objects, 3), 0);
     // But where they do move apart, they tear.
-    for (auto& v : tiles[1].position_tangents) v.x[0] += 1e-3;
+    Tangents& tangents = tiles[1].position_tangents;
+    for (size_t v = 0; v < 4; ++v)
+      tangents.set(v, tangents[v] + Vec3<Lanes>{{1e-3, 0, 0, 0}, {}, {}});
     EXPECT_GT(length_with(united(tiles), 2), 0.5);
   }
 }

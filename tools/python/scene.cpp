@@ -54,12 +54,12 @@ using Faces = nb::ndarray<nb::numpy, const uint32_t, nb::shape<-1, 3>, nb::c_con
 using Indices = nb::ndarray<nb::numpy, const uint32_t, nb::shape<-1>, nb::c_contig>;
 
 Faces view_faces(const MeshView& view) {
-  const std::vector<FaceIndices>& faces = view.mesh().faces;
+  const SharedVector<FaceIndices>& faces = view.mesh().faces;
   return Faces(faces.front().data(), {faces.size(), 3}, keeper(view.scene));
 }
 
 Indices view_weld(const MeshView& view) {
-  const std::vector<uint32_t>& weld = view.mesh().weld;
+  const SharedVector<uint32_t>& weld = view.mesh().weld;
   return Indices(weld.data(), {weld.size()}, keeper(view.scene));
 }
 

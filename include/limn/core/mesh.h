@@ -13,6 +13,8 @@
 #include "limn/core/dual.h"
 #include "limn/core/error.h"
 #include "limn/core/ids.h"
+#include "limn/core/shared_vector.h"
+#include "limn/core/tangents.h"
 #include "limn/core/vec.h"
 
 namespace limn {
@@ -57,33 +59,33 @@ class MeshAttribute;  // mesh_attribute.h
 // A mesh in world space. Positions are floats, so Embree, shading and edges use identical
 // vertices.
 struct Mesh {
-  std::vector<Vec3f> positions;    // V, scene units, as in the file (copies along seams are kept)
-  std::vector<FaceIndices> faces;  // F by 3, into positions
-  std::vector<uint32_t> weld;      // V: the smallest index of a vertex at the same position
+  SharedVector<Vec3f> positions;    // V, scene units, as in the file (copies along seams are kept)
+  SharedVector<FaceIndices> faces;  // F by 3, into positions
+  SharedVector<uint32_t> weld;      // V: the smallest index of a vertex at the same position
 
   NormalSource normal_source = NormalSource::kFace;
-  std::vector<Vec3d> normals;           // N unit vectors; empty for kFace
-  std::vector<FaceIndices> normal_ids;  // F by 3, into normals; empty for kFace
+  SharedVector<Vec3d> normals;           // N unit vectors; empty for kFace
+  SharedVector<FaceIndices> normal_ids;  // F by 3, into normals; empty for kFace
 
   // True if the shape's material or emitter reads textures; else the next five are empty.
   bool textured = false;
   UvSource uv_source = UvSource::kNone;
-  std::vector<Vec3f> uv_places;
-  std::vector<FaceIndices> uv_ids;  // F by 3, into uv_places
+  SharedVector<Vec3f> uv_places;
+  SharedVector<FaceIndices> uv_ids;  // F by 3, into uv_places
   // Those that textures read; shared by copies of a mesh, copied by deep_copy().
   std::vector<std::shared_ptr<MeshAttribute>> attributes;
-  std::vector<uint32_t> file_faces;  // F: a face's index in the file; empty if its own
+  SharedVector<uint32_t> file_faces;  // F: a face's index in the file; empty if its own
 
   // Whether the shape's material needs tangents (tangent.h). Where it does not, the next three
   // are empty.
   bool has_tangents = false;
-  std::vector<Vec3d> u_directions;      // sums of unit vectors along which u grows, times angles
-  std::vector<FaceIndices> u_ids;       // F by 3, into u_directions
-  std::vector<Vec3<Lanes>> u_tangents;  // their derivatives; empty where all are zero
+  std::vector<Vec3d> u_directions;  // sums of unit vectors along which u grows, times angles
+  std::vector<FaceIndices> u_ids;   // F by 3, into u_directions
+  Tangents u_tangents;              // their derivatives; empty where all are zero
 
   // Derivatives with respect to the parameters of the pass; empty where all are zero.
-  std::vector<Vec3<Lanes>> position_tangents;  // V
-  std::vector<Vec3<Lanes>> normal_tangents;    // N
+  Tangents position_tangents;  // V
+  Tangents normal_tangents;    // N
 
   // Number of faces that the loader removed because two of their corners coincide.
   uint64_t collapsed_faces = 0;

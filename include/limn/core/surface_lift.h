@@ -66,7 +66,7 @@ std::array<Vec3<S>, 3> corner_normals(const Mesh& mesh, FaceId face) {
     n[k] = {a.x, a.y, a.z};
     if constexpr (!std::is_same_v<S, double>) {
       if (mesh.normal_tangents.empty()) continue;
-      const Vec3<Lanes>& d = mesh.normal_tangents[ids[k]];
+      const Vec3<Lanes> d = mesh.normal_tangents[ids[k]];
       n[k] = {{a.x, d.x}, {a.y, d.y}, {a.z, d.z}};
     }
   }
@@ -87,8 +87,8 @@ void fetch_shading(const Mesh& mesh, FaceId face) {
     fetch(mesh.normals, ids[k]);
     // Plain numbers read no tangents.
     if constexpr (!std::is_same_v<S, double>) {
-      if (!mesh.position_tangents.empty()) fetch(mesh.position_tangents, vertices[k]);
-      if (!mesh.normal_tangents.empty()) fetch(mesh.normal_tangents, ids[k]);
+      if (!mesh.position_tangents.empty()) mesh.position_tangents.fetch(vertices[k]);
+      if (!mesh.normal_tangents.empty()) mesh.normal_tangents.fetch(ids[k]);
     }
   }
 }

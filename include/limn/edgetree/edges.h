@@ -68,12 +68,12 @@ struct CutVertex {
 // The edges of one mesh with all data that queries need. Welded: copies of a vertex along a texture
 // seam are one vertex.
 struct EdgeMesh {
-  std::vector<Vec3d> positions;       // V, world space, equal to Embree's floats
-  std::vector<Vec3<Lanes>> tangents;  // V; empty if nothing moves
-  std::vector<CutVertex> cuts;  // of the last vertices, where edges of other meshes split these
-  std::vector<Plane> planes;    // F, outward, double precision
-  std::vector<Edge> edges;      // E
-  ShapeId shape;                // the shape of `planes`; none for intersection curves
+  std::vector<Vec3d> positions;  // V, world space, equal to Embree's floats
+  Tangents tangents;             // V; empty if nothing moves
+  std::vector<CutVertex> cuts;   // of the last vertices, where edges of other meshes split these
+  std::vector<Plane> planes;     // F, outward, double precision
+  std::vector<Edge> edges;       // E
+  ShapeId shape;                 // the shape of `planes`; none for intersection curves
   // Of the edges of a texture, an object of their own: V, where vertices lie on their edge's first
   // face, by the barycentric coordinates of its second and third corner. Else empty.
   std::vector<std::array<double, 2>> places;
@@ -101,7 +101,7 @@ struct EdgeMesh {
   const Edge& edge(EdgeId id) const { return edges[id.index()]; }
   const Plane& plane(FaceId id) const { return planes[id.index()]; }
   const Vec3d& position(VertexId id) const { return positions[id.index()]; }
-  const Vec3<Lanes>& tangent(VertexId id) const { return tangents[id.index()]; }
+  Vec3<Lanes> tangent(VertexId id) const { return tangents[id.index()]; }
   std::span<const FaceRef> faces_around(EdgeId id) const {
     const uint32_t *begin = &face_offsets[id.index()], *end = begin + 1;
     return {incident_faces.data() + *begin, *end - *begin};
@@ -126,10 +126,7 @@ struct EdgeMesh {
   void fetch_ends(EdgeId id) const {
     for (const VertexId vertex : edge(id).vertices) {
       __builtin_prefetch(&positions[vertex.index()]);
-      if (tangents.empty()) continue;
-      const char* begin = reinterpret_cast<const char*>(&tangents[vertex.index()]);
-      __builtin_prefetch(begin);
-      __builtin_prefetch(begin + sizeof(Vec3<Lanes>) - 1);
+      if (!tangents.empty()) tangents.fetch(vertex.index());
     }
     __builtin_prefetch(incident_faces.data() + face_offsets[id.index()]);
   }
