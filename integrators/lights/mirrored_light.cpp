@@ -190,7 +190,7 @@ std::unique_ptr<MirroredLight> MirroredLight::make(const Scene& scene, const Lig
           const Vec3d to = source.infinite ? source.light : source.light - part.bounds.center();
           source.light = source.light - n * (2 * dot(to, n));
           source.width = passed_width(bsdf);
-          source.turn = 4 * source.width;
+          source.passed_cone = 4 * source.width;
           result->add(part, *bsdf, n, source);
         }
       }
@@ -259,8 +259,8 @@ void MirroredLight::add(const FlatPart& part, const Bsdf& bsdf, const Vec3d& nor
   const double height = dot(to, normal);
   if (!(height > kLeastHeight * (image.infinite ? 1 : image.radius))) return;
   image.albedo = std::min(bsdf.lobe().albedo, 1.0);
-  if (image.turn == 0) image.width = bsdf.lobe().model->width(bsdf.lobe());
-  if (image.infinite) image.rest = std::cos(spread_of(image.width, 0.5 * image.size));
+  if (image.passed_cone == 0) image.width = bsdf.lobe().model->width(bsdf.lobe());
+  if (image.infinite) image.least_cosine = std::cos(spread_of(image.width, 0.5 * image.size));
   if (image.emitter) image.irradiance = lights_.estimate(*image.emitter, image.center);
   image.light_in_part = image.irradiance * height / length(to) * image.radius * image.radius;
   images_.push_back(image);
@@ -293,10 +293,10 @@ bool MirroredLight::sees(const Image& image, const Vec3d& p, Highlight& highligh
   const double size = image.infinite ? image.size : image.size / (a + b);
   // Nothing of it is bright where the half vector is tilted by more.
   const Vec3d half = highlight.light - highlight.toward;
-  const double rest = image.infinite
-                          ? image.rest
-                          : std::cos(spread_of(image.width, 0.5 * size / highlight.nearness));
-  if (dot(half, n) < rest * length(half)) return false;
+  const double least = image.infinite
+                           ? image.least_cosine
+                           : std::cos(spread_of(image.width, 0.5 * size / highlight.nearness));
+  if (dot(half, n) < least * length(half)) return false;
   // A half vector that turns turns what is mirrored twice as far.
   const double lobe = 2 * image.width * highlight.nearness;
   highlight.bsdf = image.bsdf;
@@ -304,8 +304,8 @@ bool MirroredLight::sees(const Image& image, const Vec3d& p, Highlight& highligh
   highlight.depth = height + kFlat * image.radius;
   highlight.half_angle = 2 * lobe + size;
   // Where the light is wider than the lobe, its image is about as wide as the light.
-  const double cone = spread_of(std::max(lobe, image.turn * highlight.nearness), size);
-  const bool even = image.turn > 0 || lobe < 2 * size;
+  const double cone = spread_of(std::max(lobe, image.passed_cone * highlight.nearness), size);
+  const bool even = image.passed_cone > 0 || lobe < 2 * size;
   highlight.cone = even ? versine(std::max(cone, kLeastCone)) : 0;
   if (highlight.cone > 0) highlight.toward = normalize(shown - p);
   highlight.irradiance = image.albedo * highlight.nearness * highlight.nearness *

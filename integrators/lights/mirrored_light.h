@@ -119,9 +119,10 @@ class MirroredLight {
     double radius = 0;
     double width = 0, albedo = 0;  // of the lobe
     bool infinite = false;         // the light is
-    double turn = 0, rest = 1;  // of a plate's cone [rad], 0: a mirror; cosine of the tilt (`sees`)
-    Vec3d light;                // its center, or the unit direction towards it
-    double size = 0;            // radius of a sphere around it; at infinity the sine of its angle
+    double passed_cone = 0;        // half-angle of what a plate passes [rad]; 0: it mirrors
+    double least_cosine = 1;       // of the half vector where it is bright (`sees`), if infinite
+    Vec3d light;                   // its center, or the unit direction towards it
+    double size = 0;  // radius of a sphere around it; at infinity the sine of its angle
     std::optional<size_t> emitter;  // which of all lights it is; none: a patch
     double irradiance = 0;          // across it, at the part's center
     double light_in_part = 0;       // how much of it falls on the part
