@@ -77,8 +77,9 @@ double ReverseEstimator::film_points(size_t slot) const {
   if (is_filter(slot)) return filtered_->line_samples();
   if (!planned_.empty()) return planned_[slot];
   if (!types_[slot]->on_film_alone()) return options_.shadow_samples;
-  if (options_.camera_samples > 0) return options_.camera_samples;
-  return method_.closed ? 1 : 0.25;  // where nothing else is noisy, these points are what is
+  // One has 0.09 to 1.14 times the squared error x time of a quarter in 13 scenes, by the geometric
+  // mean 0.74 with `forest` and 0.51 with `silhouettes`.
+  return options_.camera_samples > 0 ? options_.camera_samples : 1;
 }
 
 double ReverseEstimator::samples_of(size_t slot) const {
@@ -91,7 +92,7 @@ double ReverseEstimator::samples_of(size_t slot) const {
 std::vector<double> ReverseEstimator::possible_samples(size_t slot) const {
   const auto& term = terms_[slot];
   if (!term || slot == pixel_slot_ || is_filter(slot)) return {samples_of(slot)};
-  if (types_[slot]->on_film_alone()) return {0.25, 0.5, 1, 2, 4, 8, 16};
+  if (types_[slot]->on_film_alone()) return {1, 2, 4, 8, 16};
   if (types_[slot]->regions) return {0.25, 0.5, 1, 2, 4, 8};
   return {1, 2, 3};
 }

@@ -164,8 +164,7 @@ TEST(ReverseSamples, SeveralEdgesOfAVertexHaveTheMeanOfOne) {
   EXPECT_GE(largest, 5);  // it says something
 }
 
-// A run tells how many points each term took on the film: for the camera's silhouettes a quarter of
-// the paths, for shadows as many, and for both where light itself has no noise.
+// A run tells how many points each term took on the film: as many as paths, if not told otherwise.
 TEST(ReverseSamples, ShadowsInViewHaveANumberOfFilmPointsOfTheirOwn) {
   const TempFiles files;
   const std::string spot = R"(<emitter type="point" id="dot">
@@ -190,14 +189,14 @@ TEST(ReverseSamples, ShadowsInViewHaveANumberOfFilmPointsOfTheirOwn) {
       return std::pair(0.0, uint64_t{0});
     };
     const uint64_t paths = 8 * 16 * 16;
-    EXPECT_EQ(samples_of("camera"), std::pair(0.25, paths / 4));
+    EXPECT_EQ(samples_of("camera"), std::pair(1.0, paths));
     const auto [samples, drawn] = samples_of(of.term);
     EXPECT_EQ(samples, 1);
     options.shadow_samples = 2;
     const auto [more_samples, more_drawn] = samples_of(of.term);
     EXPECT_EQ(more_samples, 2);
     EXPECT_EQ(more_drawn - drawn, paths);
-    EXPECT_EQ(samples_of("camera").second, paths / 4);
+    EXPECT_EQ(samples_of("camera").second, paths);
     options.shadow_samples = -1;
     EXPECT_THROW(samples_of(of.term), InputError);
   }

@@ -43,8 +43,8 @@ struct BackwardOptions {
   // this share of pairs of rays of a pixel meets surfaces apart; above 1: nowhere. Not tuned.
   double least_detail = 0.5;
   int edge_samples = 1;  // at every vertex of a path, of each term of edges; 65536 at most
-  // Points on the film, per path, of `camera`; 65536 at most. 0: as a pilot chooses; without one a
-  // quarter, and with "analytic" one. Numbers of samples other than the defaults: no pilot.
+  // Points on the film, per path, of `camera`; 65536 at most. 0: as a pilot chooses, one without a
+  // pilot. Numbers of samples other than the defaults: no pilot.
   double camera_samples = 0;
   double shadow_samples = 1;  // the same of each of `shadow` and `penumbra`, but more than 0
   int batches = 16;           // at most, for standard errors; each ends with the adjoint of normals

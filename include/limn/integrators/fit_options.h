@@ -37,8 +37,7 @@ void visit_options(Like<BackwardOptions> auto& o, auto&& visit, Task task = Task
                    : "Boundary samples on the film per path (term camera). A number turns the "
                      "pilot off",
                1e-6L, 1 << 16}
-            .or_zero(fit ? "0.25, 1 with the method analytic"
-                         : "a pilot's choice; without one 0.25, 1 with the method analytic")
+            .or_zero(fit ? "1" : "a pilot's choice; without one 1")
             .samples());
   visit(o.shadow_samples,
         Option{"shadow_samples",
