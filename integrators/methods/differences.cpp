@@ -38,7 +38,8 @@ std::vector<double> mean_of_two(const std::vector<double>& a, const std::vector<
 
 // Appends the scene moved by each step of a job, forwards and back. Where only materials or the
 // environment change these draw the same directions.
-void append_moved(const Scene& scene, const DifferenceJob& job, std::vector<Scene>& moved) {
+void append_moved(const Scene& scene, const DifferenceJob& job, bool same_paths,
+                  std::vector<Scene>& moved) {
   const Parameter parameter = find_parameter(scene, job.parameter);
   const size_t first = moved.size();
   for (const double step : job.steps) {
@@ -48,6 +49,7 @@ void append_moved(const Scene& scene, const DifferenceJob& job, std::vector<Scen
   for (size_t i = first; scene.environment && i < moved.size(); ++i) {
     moved[i].environment = drawn_alike(moved[i].environment, *scene.environment);
   }
+  if (same_paths) return draw_as(std::span(moved).subspan(first), scene);
   const auto largest = std::max_element(job.steps.begin(), job.steps.end());
   const size_t farthest = 2 * (largest - job.steps.begin());
   draw_alike(std::span(moved).subspan(first), farthest, farthest + 1);
@@ -83,13 +85,13 @@ void DifferenceEstimate::add_batch(const std::vector<double>& sums, const Film& 
 
 CentralDifferences central_differences(const Scene& scene, const std::vector<DifferenceJob>& jobs,
                                        int block, const RunSettings& settings, bool even,
-                                       const std::optional<Blur>& blur) {
+                                       const std::optional<Blur>& blur, bool same_paths) {
   const Stopwatch watch;
   const Numbers numbers = even ? Numbers::kEvenInBatches : Numbers::kIndependent;
   std::vector<Scene> moved;
   CentralDifferences result;
   for (const DifferenceJob& job : jobs) {
-    append_moved(scene, job, moved);
+    append_moved(scene, job, same_paths, moved);
     result.estimates.emplace_back(job.combinations.size(), DifferenceEstimate(scene.film, block));
   }
   const auto at = [&](const auto& placed) {

@@ -49,6 +49,7 @@ class DrawnAlike final : public Bsdf {
   }
   std::optional<Vec3d> sample(const Vec3d& n, const Vec3d& wi, double u1, double u2,
                               const Rgb<double>* at) const override {
+    if (sides_[1] == sides_[2]) return sides_[1]->sample(n, wi, u1, u2, AtSide(*this, 1, at).get());
     const int i = u1 < 0.5 ? 1 : 2;
     return sides_[i]->sample(n, wi, 2 * u1 - (i - 1), u2, AtSide(*this, i, at).get());
   }
@@ -137,16 +138,15 @@ bool textures_differ(const Shape& a, const Shape& b, int k) {
          (map.map().width > 0 && map.texels().data != other.texels_on(b.mesh).texels().data);
 }
 
-}  // namespace
-
-void draw_alike(std::span<Scene> scenes, size_t first, size_t second) {
-  for (size_t s = 0; s < scenes[first].shapes.size(); ++s) {
-    const Shape& a = scenes[first].shapes[s];
-    const Shape& b = scenes[second].shapes[s];
-    DrawnAlike::Held held{{nullptr, a.bsdf, b.bsdf}, {}};
-    bool any = differ(a.bsdf->parameters(), b.bsdf->parameters());
-    for (int k = 0; k < a.bsdf->texture_count(); ++k) {
-      held.moved.push_back(textures_differ(a, b, k));
+// Shapes that differ between a and b draw as those two in `drawn`.
+void draw(std::span<Scene> scenes, const Scene& a, const Scene& b,
+          const std::array<const Scene*, 2>& drawn) {
+  for (size_t s = 0; s < a.shapes.size(); ++s) {
+    const auto& bsdf = a.shapes[s].bsdf;
+    DrawnAlike::Held held{{nullptr, drawn[0]->shapes[s].bsdf, drawn[1]->shapes[s].bsdf}, {}};
+    bool any = differ(bsdf->parameters(), b.shapes[s].bsdf->parameters());
+    for (int k = 0; k < bsdf->texture_count(); ++k) {
+      held.moved.push_back(textures_differ(a.shapes[s], b.shapes[s], k));
       any = any || held.moved.back();
     }
     if (!any) continue;
@@ -155,6 +155,17 @@ void draw_alike(std::span<Scene> scenes, size_t first, size_t second) {
       scene.shapes[s].bsdf = std::make_shared<DrawnAlike>(held, true);
     }
   }
+}
+
+}  // namespace
+
+void draw_alike(std::span<Scene> scenes, size_t first, size_t second) {
+  const Scene &a = scenes[first], &b = scenes[second];
+  draw(scenes, a, b, {&a, &b});
+}
+
+void draw_as(std::span<Scene> scenes, const Scene& unmoved) {
+  draw(scenes, scenes[0], unmoved, {&unmoved, &unmoved});
 }
 
 }  // namespace limn

@@ -11,5 +11,7 @@ namespace limn {
 // Where each drew its own directions, they would meet different edges and lights in a few samples,
 // by much over the step. The scenes differ in values of materials alone.
 void draw_alike(std::span<Scene> scenes, size_t first, size_t second);
+// All draw as `unmoved` does, by the same random numbers: they follow its paths.
+void draw_as(std::span<Scene> scenes, const Scene& unmoved);
 
 }  // namespace limn

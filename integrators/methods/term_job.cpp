@@ -151,7 +151,10 @@ class TermJob {
   std::vector<std::unique_ptr<SampleEstimator>> passes_at(const std::optional<double>& time,
                                                           int threads) const {
     const Warping warping{options_.warp, method_.unbiased};
-    const TermExtras extras{method_.warps ? &warping : nullptr, method_.closed, moves_film_, time};
+    const TermExtras extras{.warping = method_.warps ? &warping : nullptr,
+                            .closed = method_.closed,
+                            .moved_film = moves_film_,
+                            .time = time};
     std::vector<std::unique_ptr<SampleEstimator>> passes;
     for (size_t k = 0; k < parameters_.size(); k += kLanes) {
       const auto some =

@@ -15,13 +15,12 @@ inline bool PathTracer<S, Visitor>::begin_vertex(Walk& walk) {
   if (is_complete(walk.bounces)) return false;
   walk.scattering.emplace(walk.surface, walk.wi, c_.scene.shading);
   if (walk.scattering->black()) return false;
-  if (c_.unmoved && walk.scattering->is_smooth()) {
-    walk.scattering->share_by(SmoothShares::By::kSteps);
+  constexpr bool kColours = kColoursAlone<S, Visitor>;
+  if ((c_.unmoved || kColours) && walk.scattering->is_smooth()) {
+    using By = SmoothShares::By;
+    walk.scattering->share_by(c_.unmoved ? By::kSteps : By::kSlope);
   }
-  if constexpr (kColoursAlone<S, Visitor>) {
-    if (walk.scattering->is_smooth()) walk.scattering->share_by(SmoothShares::By::kSlope);
-    colour(walk);
-  }
+  if constexpr (kColours) colour(walk);
   set_motion(walk);
   walk.light.reset();
   walk.lit = walk.again;

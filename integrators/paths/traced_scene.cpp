@@ -33,7 +33,7 @@ TracedScene::TracedScene(const Scene& scene, int threads, const Options& options
                closed_.get(),
                viewpoints_.get(),
                mirrored_.get(),
-               nullptr,
+               options.of_differences ? &scene : nullptr,
                flat_mirrors_.get(),
                options.edges && has_straight_ways(scene)} {}
 

@@ -37,6 +37,8 @@ class TracedScene {
     bool edges = false;
     // The faces that overlap; null: they are found here.
     std::shared_ptr<const CoincidentFaces> faces = nullptr;
+    // Paths are those of differences (PathContext::unmoved).
+    bool of_differences = false;
   };
   // scene: with its parameters seeded; it must outlive this.
   TracedScene(const Scene& scene, int threads, const Options& options);

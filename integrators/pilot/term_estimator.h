@@ -30,6 +30,7 @@ struct TermExtras {
   const Warping* warping = nullptr;  // null where directions are not warped
   bool closed = false;  // what surfaces scatter is known in closed form, see closed_light.h
   bool moved_film = false;
+  bool of_differences = false;      // paths are those of differences
   std::optional<double> time = {};  // of the shutter, see at_time(); none: the reference time
 };
 

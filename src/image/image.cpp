@@ -167,8 +167,9 @@ class ExrReader {
     image_.height = static_cast<int>(height_);
     image_.channels = static_cast<int>(names_.size());
     image_.data.reserve(static_cast<size_t>(width_ * height_) * names_.size());
-    if (compression_ == EXR_COMPRESSION_DWAA || compression_ == EXR_COMPRESSION_DWAB) {
-      read_dwa();
+    // OpenEXR 3.1's C reader does not support DWA, and crashes on one of four channels of halves.
+    if (alpha_ || compression_ == EXR_COMPRESSION_DWAA || compression_ == EXR_COMPRESSION_DWAB) {
+      read_by_classes();
     } else {
       BlockDecoder decoder(exr_);
       for_each_block([&](const exr_chunk_info_t& block, int64_t x, int64_t y) {
@@ -311,8 +312,7 @@ class ExrReader {
     exr_.check(exr_decoding_run(exr_.context(), 0, &pipeline));
   }
 
-  // OpenEXR 3.1's C reader does not support this compression.
-  void read_dwa() {
+  void read_by_classes() {
     for_each_block([](const exr_chunk_info_t&, int64_t, int64_t) {});
     try {
       Imf::InputFile input(exr_.file().c_str());
@@ -350,11 +350,10 @@ class ExrReader {
   Image image_;
 };
 
-}  // namespace
-
-void write_exr(const std::string& file, const Image& image, bool half,
-               const std::vector<ImageAttribute>& attributes) {
-  const std::vector<const char*> names = channel_names(image.channels);
+// names: of the image's channels.
+void write_channels(const std::string& file, const Image& image,
+                    const std::vector<const char*>& names, bool half,
+                    const std::vector<ImageAttribute>& attributes) {
   Imf::Header header = plain_header(image.width, image.height, attributes);
   for (const char* name : names) {
     header.channels().insert(name, Imf::Channel(half ? Imf::HALF : Imf::FLOAT));
@@ -367,6 +366,27 @@ void write_exr(const std::string& file, const Image& image, bool half,
            : interleaved(const_cast<float*>(image.data.data()), Imf::FLOAT, names, image.width,
                          origin);
   write_pixels(file, header, buffer, image.height);
+}
+
+}  // namespace
+
+void write_exr(const std::string& file, const Image& image, bool half,
+               const std::vector<ImageAttribute>& attributes) {
+  write_channels(file, image, channel_names(image.channels), half, attributes);
+}
+
+void write_exr_with_alpha(const std::string& file, const Image& image, const Image& alpha,
+                          bool half, const std::vector<ImageAttribute>& attributes) {
+  std::vector<const char*> names = channel_names(image.channels);
+  const size_t colours = names.size();
+  names.push_back("A");
+  Image both(image.width, image.height, image.channels + 1);
+  for (size_t i = 0; i < alpha.data.size(); ++i) {
+    float* const pixel = &both.data[i * names.size()];
+    std::copy_n(&image.data[i * colours], colours, pixel);
+    pixel[colours] = alpha.data[i];
+  }
+  write_channels(file, both, names, half, attributes);
 }
 
 void write_exr_layers(const std::string& file, const std::vector<ImageLayer>& layers,

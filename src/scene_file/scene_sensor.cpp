@@ -103,8 +103,9 @@ bool read_pixel_format(Properties& p, std::vector<std::string>& warnings) {
   const bool luminance = format.starts_with("luminance");
   const std::string written = luminance ? "luminance" : "rgb";
   if (format != written) {
-    warnings.push_back(format_warning(p.where("pixel_format"),
-                                      "pixel_format " + format + " is written as " + written));
+    warnings.push_back(format_warning(
+        p.where("pixel_format"), "pixel_format " + format + " is written as " + written +
+                                     (format.ends_with("a") ? "; render --alpha adds A" : "")));
   }
   return luminance;
 }

@@ -422,8 +422,11 @@ class SceneBuilder {
     std::vector<std::string> wanted;
     for (const auto& [name, texture] : textures_of(shape)) {
       if (texture->needs_uv() && raw.uv_source == UvSource::kNone) {
-        throw InputError(shape.where, "no texture coordinates in " + raw.where.file +
-                                          ", needed by the texture of \"" + name + "\"");
+        throw InputError(
+            shape.where,
+            "no texture coordinates in " + raw.where.file +
+                (texture->is_tangent() ? ", which \"" + name + "\" takes its directions from"
+                                       : ", needed by the texture of \"" + name + "\""));
       }
       const std::string attribute = texture->attribute();
       if (attribute.empty()) continue;

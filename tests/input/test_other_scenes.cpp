@@ -96,7 +96,7 @@ TEST(OtherScenes, SamplersFilmsAndTypesWithRemarks) {
             (std::vector<std::string>{
                 "string:1:32: warning: sensor type \"Perspective\" is read as \"perspective\", "
                 "which Mitsuba finds on some systems only",
-                "string:3:22: warning: pixel_format rgba is written as rgb",
+                "string:3:22: warning: pixel_format rgba is written as rgb; render --alpha adds A",
                 "string:2:1: warning: sampler \"multijitter\" is read as independent: limn "
                 "chooses its own points"}));
 }

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "limn/core/coverage.h"
 #include "limn/core/error.h"
 #include "limn/integrators/trace_backward.h"
 #include "tools/limn/backward_output.h"
@@ -31,6 +32,7 @@ class BackwardCommand final : public Command {
   void add_options(CLI::App& app) override {
     app_ = &app;
     add_common_options(app, common_);
+    add_what_option(app, common_);
     auto* adjoint =
         app.add_option("--adjoint", adjoint_, "Image of dLoss/dpixel (.exr), in place of --target")
             ->type_name("FILE");
@@ -156,7 +158,8 @@ class BackwardCommand final : public Command {
       return loss;
     }
     settings.seconds *= kImageShare;
-    const Image target = read_image(target_);
+    const bool alpha = common_.what == "alpha";
+    const Image target = alpha ? read_coverage(target_) : read_image(target_);
     check_loss_images(scene, target, {}, target_);
     loss_.method = loss_method(options_.method);
     loss_.points = options_.points;

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <sstream>
 
+#include "limn/core/coverage.h"
 #include "limn/core/error.h"
 #include "limn/core/names.h"
 #include "limn/integrators/backward.h"
@@ -60,6 +61,7 @@ class FitCommand final : public Command {
 
  private:
   std::vector<ViewArguments> view_arguments() const;
+  std::vector<ViewArguments> with_targets(const std::vector<ViewArguments>& views) const;
   FitArguments arguments() const;
   std::vector<FitView> read_views(const FitArguments& arguments);
   void check_resume() const;
@@ -72,7 +74,7 @@ class FitCommand final : public Command {
   Warnings warnings_;
   const CLI::App* app_ = nullptr;
   CLI::Option* steps_option_ = nullptr;
-  std::vector<std::string> targets_, masks_, views_;
+  std::vector<std::string> targets_, masks_, alphas_, views_;
   FitArguments given_;
   std::string output_, resume_, truth_;
   bool no_report_ = false;
@@ -93,6 +95,11 @@ void FitCommand::add_options(CLI::App& app) {
          "--mask", masks_,
          "Image of pixel weights (.exr), one for each target in turn; \"-\" for none (repeatable)")
       ->type_name("EXR")
+      ->allow_extra_args(false);
+  app.add_option("--alpha", alphas_,
+                 "Mask that the coverage of a target's view is compared with, one for each target "
+                 "in turn, which may be \"-\"; \"-\" for none (repeatable)")
+      ->type_name("IMAGE")
       ->allow_extra_args(false);
   app.add_option("--view", views_, "Further scene that shares the parameters (repeatable)")
       ->type_name("SCENE[;NAME=VALUE...]")
@@ -125,7 +132,8 @@ void FitCommand::add_options(CLI::App& app) {
 
 // The scene and those of --view, each with all its sensors, in turn: a target for each.
 std::vector<ViewArguments> FitCommand::view_arguments() const {
-  std::vector<ViewArguments> scenes{{absolute(common_.scene), common_.defines, "", "", "", {}}};
+  std::vector<ViewArguments> scenes{
+      {absolute(common_.scene), common_.defines, "", "", "", false, {}}};
   for (const std::string& text : views_) {
     ViewArguments view;
     std::stringstream stream(text);
@@ -154,11 +162,28 @@ std::vector<ViewArguments> FitCommand::view_arguments() const {
         targets_.size(), views.size()));
   }
   if (masks_.size() > targets_.size()) throw InputError("there are more --mask than --target");
+  if (alphas_.size() > targets_.size()) throw InputError("there are more --alpha than --target");
+  return with_targets(views);
+}
+
+// A view for each target, and for each --alpha behind it.
+std::vector<ViewArguments> FitCommand::with_targets(const std::vector<ViewArguments>& views) const {
+  std::vector<ViewArguments> all;
+  const auto given = [](const std::vector<std::string>& list, size_t v) {
+    return v < list.size() && list[v] != "-" ? absolute(list[v]) : "";
+  };
   for (size_t v = 0; v < views.size(); ++v) {
-    views[v].target = absolute(targets_[v]);
-    if (v < masks_.size() && masks_[v] != "-") views[v].mask = absolute(masks_[v]);
+    const size_t before = all.size();
+    ViewArguments view = views[v];
+    view.mask = given(masks_, v);
+    view.target = given(targets_, v);
+    if (!view.target.empty()) all.push_back(view);
+    view.target = given(alphas_, v);
+    view.alpha = true;
+    if (!view.target.empty()) all.push_back(view);
+    if (all.size() == before) throw InputError("--target - needs an --alpha of this view");
   }
-  return views;
+  return all;
 }
 
 FitArguments FitCommand::arguments() const {
@@ -177,6 +202,9 @@ FitArguments FitCommand::arguments() const {
     text = with_absolute_field(text, std::min(text.size(), text.rfind('=')));
   }
   a.views = view_arguments();
+  if (!alphas_.empty() && a.options.loss == LossKind::kRelativeL2) {
+    throw InputError("--alpha: a loss relative to coverage means little: --loss l2 or l1");
+  }
   refuse_samples(*app_, a.options.backward.points, {"--spp"}, a.options);
   if (a.options.optimiser == OptimiserKind::kLbfgs) {
     if (app_->get_option("--pixels")->count() > 0 && !a.options.backward.uniform_pixels) {
@@ -191,6 +219,7 @@ FitArguments FitCommand::arguments() const {
 
 std::vector<FitView> FitCommand::read_views(const FitArguments& arguments) {
   std::vector<FitView> views;
+  Scene scene;
   for (size_t v = 0; v < arguments.views.size(); ++v) {
     const ViewArguments& view = arguments.views[v];
     const auto same_scene = [&](const ViewArguments& other) {
@@ -198,17 +227,17 @@ std::vector<FitView> FitCommand::read_views(const FitArguments& arguments) {
     };
     FitView read;
     if (v > 0 && same_scene(arguments.views[v - 1])) {  // by another of its sensors
-      read.scene = deep_copy(views.back().scene);
-      use_sensor(read.scene, view.sensor);
+      use_sensor(scene, view.sensor);
     } else {
       CommonOptions common;
       common.scene = view.scene;
       common.defines = view.defines;
       common.sensor = view.sensor;
       common.shading = arguments.shading;
-      read.scene = load_scene(common, warnings_);
+      scene = load_scene(common, warnings_);
     }
-    read.target = read_image(view.target);
+    read.scene = view.alpha ? coverage_of(scene) : deep_copy(scene);
+    read.target = view.alpha ? read_coverage(view.target) : read_image(view.target);
     if (!view.mask.empty()) read.mask = read_image(view.mask);
     check_loss_images(read.scene, read.target, read.mask, view.target, view.mask);
     views.push_back(std::move(read));

@@ -129,6 +129,7 @@ class GradientCommand final : public Command {
   void add_options(CLI::App& app) override {
     app_ = &app;
     add_common_options(app, common_);
+    add_what_option(app, common_);
     add_parameter_options(app, options_.parameters);
     visit_options(options_, OptionAdder(app));
     add_samples_option(app, samples_);

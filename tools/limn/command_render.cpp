@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <sstream>
 
+#include "limn/core/image_alpha.h"
 #include "limn/core/names.h"
 #include "limn/integrators/layers.h"
 #include "limn/integrators/methods.h"
@@ -33,11 +34,15 @@ class RenderCommand final : public Command {
                    "layers of one file, with commas: " +
                        limn::join(layer_names()))
         ->capture_default_str();
+    app.add_flag("--alpha", alpha_,
+                 "Also write channel A of the same file: the share of each pixel that surfaces "
+                 "cover, by as many rays as there are samples");
     add_time_option(app, common_);
     add_debug_option(app, debug_);
     app.get_option("--debug-sample")->excludes("--time");
     add_part_option(app, common_);
     app.get_option("--part")->excludes("--time");
+    app.get_option("--part")->excludes("--alpha");
   }
   bool join(BatchStore& store) override {
     common_.run.store = &store;
@@ -92,9 +97,10 @@ class RenderCommand final : public Command {
       if (std::find(layers.begin(), layers.end(), name) != layers.end()) continue;
       throw InputError("--what: " + unknown_name("word", name, known));
     }
-    refuse_options(*app_,
-                   {"--method", "--generator", "--points", "--part", "--debug-sample", "--time"},
-                   "not for layers (--what)");
+    refuse_options(
+        *app_,
+        {"--method", "--generator", "--points", "--part", "--debug-sample", "--time", "--alpha"},
+        "not for layers (--what)");
     return true;
   }
   static std::vector<std::string> split_names(const std::string& text) {
@@ -132,6 +138,13 @@ class RenderCommand final : public Command {
     }
   }
   const char* what() const { return kRenderWhat[static_cast<int>(options_.what)]; }
+  static Image alpha_of(const Scene& scene, RunSettings settings, int64_t spp) {
+    settings.spp = static_cast<int>(spp);
+    settings.seconds = 0;
+    settings.progress = nullptr;
+    settings.interrupted = nullptr;
+    return render_layers(scene, {"alpha"}, settings).layers.at(0).image;
+  }
   bool has_points() const { return options_.method->image->closed_light; }
   bool has_generator() const {
     return options_.points != FilmPoints::kFaces && !options_.method->image->looks_around;
@@ -146,7 +159,13 @@ class RenderCommand final : public Command {
     if (has_points()) attributes.push_back({"limn.points", name_of(options_.points)});
     attributes.push_back({kOutputAttribute, output_name(output_)});
     remove_stale(output_, {output_});
-    write_exr(output_, film_channels(scene, image), scene.film.half, attributes);
+    const Image colours = film_channels(scene, image);
+    if (alpha_) {
+      write_exr_with_alpha(output_, colours, alpha_of(scene, settings, result.spp), scene.film.half,
+                           attributes);
+    } else {
+      write_exr(output_, colours, scene.film.half, attributes);
+    }
     write_png(picture, image, 1);
     if (!common_.quiet) print(picture, result);
     if (common_.json.empty()) return;
@@ -181,6 +200,7 @@ class RenderCommand final : public Command {
   RenderOptions options_;
   CLI::App* app_ = nullptr;
   std::string output_, debug_, what_ = kRenderWhat[0];
+  bool alpha_ = false;
 };
 
 }  // namespace

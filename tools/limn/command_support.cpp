@@ -8,6 +8,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "limn/core/coverage.h"
 #include "limn/core/error.h"
 #include "limn/core/names.h"
 #include "limn/core/parallel.h"
@@ -106,6 +107,14 @@ void add_time_option(CLI::App& app, CommonOptions& common) {
   app.get_option("--time")->excludes("--spp");
 }
 
+void add_what_option(CLI::App& app, CommonOptions& common) {
+  app.add_option("--what", common.what,
+                 "Of what: the image, or alpha, the share of each pixel that surfaces cover "
+                 "(whatever their material)")
+      ->check(CLI::IsMember({"image", "alpha"}))
+      ->capture_default_str();
+}
+
 void add_samples_option(CLI::App& app, std::string& samples) {
   app.add_option("--samples", samples,
                  "Samples of each term per pixel sample, in the order in which --terms lists them, "
@@ -145,6 +154,7 @@ Scene load_scene(const CommonOptions& common, Warnings& shown) {
   }
   if (!common.sensor.empty()) use_sensor(scene, common.sensor);
   if (common.shading == "mitsuba") set_shading(scene, ShadingModel::kMitsuba);
+  if (common.what == "alpha") return coverage_of(scene);
   return scene;
 }
 

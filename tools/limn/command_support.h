@@ -26,8 +26,9 @@ struct CommonOptions {
   std::string json;
   bool quiet = false;
   std::string shading = "continuous";
-  double smooth_as = 0;  // 0: smooth
-  std::string part;      // "K/N" of --part; "": the whole run
+  double smooth_as = 0;        // 0: smooth
+  std::string part;            // "K/N" of --part; "": the whole run
+  std::string what = "image";  // or "alpha": the scene is that of coverage_of()
 };
 
 // Scene or mesh, -D, --seed, --threads, --quiet. name, text, type: of the input.
@@ -43,6 +44,8 @@ std::vector<Method> parse_methods(const std::vector<std::string>& names, Task ta
 void add_time_option(CLI::App& app, CommonOptions& common);
 // --samples
 void add_samples_option(CLI::App& app, std::string& samples);
+// --what, in place of the image: its coverage
+void add_what_option(CLI::App& app, CommonOptions& common);
 // --debug-sample
 void add_debug_option(CLI::App& app, std::string& place);
 

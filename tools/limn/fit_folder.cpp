@@ -38,7 +38,7 @@ struct nlohmann::adl_serializer<std::vector<limn::Vec3<T>>> {
 namespace limn {
 
 // Fields by their names, for writing and reading.
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ViewArguments, scene, defines, sensor, target, mask,
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ViewArguments, scene, defines, sensor, target, mask, alpha,
                                    fingerprints)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FitState::Numbers, values, first, second, natural_step, lambda)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FitState::Shape, positions, normals, faces)
@@ -50,7 +50,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-constexpr int kFormat = 7;                  // of fit.json and state.cbor
+constexpr int kFormat = 8;                  // of fit.json and state.cbor
 constexpr size_t kDistanceSamples = 10000;  // on each surface; not tuned
 
 // Calls visit(name, member) for what is no row of the table of options: reading and writing go over
@@ -421,9 +421,14 @@ void FitFolder::add_snapshot(const Fit& fit, const RunSettings& settings, int sp
     if (image.spp < (faces ? 1 : spp)) break;  // interrupted
     const Film& film = view.scene.film;
     const std::string name = fmt::format("step_{:05}_view_{}.png", fit.steps(), v);
-    write_png(file(name), mean_image(image.radiance, film.crop_width, film.crop_height), 1);
+    // Images of coverage_of() are less by 1.
+    const auto write = [&](const std::string& to, Image picture) {
+      for (float& value : picture.data) value += arguments_.views[v].alpha ? 1 : 0;
+      write_png(file(to), picture, 1);
+    };
+    write(name, mean_image(image.radiance, film.crop_width, film.crop_height));
     snapshot["pictures"].push_back(name);
-    write_png(file(fmt::format("view_{}_target.png", v)), view.target, 1);
+    write(fmt::format("view_{}_target.png", v), view.target);
   }
   // A run that goes on has one of where it was interrupted.
   if (again) snapshots_.erase(snapshots_.size() - 1);

@@ -22,6 +22,7 @@ struct ViewArguments {
   std::map<std::string, std::string> defines;
   std::string sensor;        // its number in the scene
   std::string target, mask;  // "": no mask
+  bool alpha = false;        // the target is of the scene's coverage
   // Of the scene, the images and the fields of vertices as the fit found them.
   std::map<std::string, std::string> fingerprints;
 };

@@ -5,8 +5,11 @@
         [--minutes N] [--path DIR] [-D name=value] [--at-least N]
 
 Scenes: those that limn opens (census.py). Copies of their XML have films of N by N pixels (8)
-without a crop. In each, one parameter of each kind that `limn info` lists is checked three times. A
+without a crop. In each, one parameter of each kind that `limn info` lists is checked four times. A
 kind is the last part of a name, with its owner where that is a sensor or a light.
+
+same paths: `limn check --same-paths`, of kinds that move nothing: the term interior against
+differences along the same paths.
 
 paths: `limn gradient` and `limn backward` along the same random paths (term interior), whose dot
 products with a random adjoint must be equal but for rounding. Reverse mode has no other term where
@@ -22,7 +25,7 @@ derivative would.
 
 An array moves along one field (vertices by the same vector, texels by the same amount), or by one
 of its numbers; in `check --reverse` along a random one. Scenes with smooth lobes have the first
-check alone: edges seen by way of these are missing, which `check` says itself.
+two checks alone: edges seen by way of these are missing, which `check` says itself.
 
 Results are kept in FOLDER/results.json (out/derivatives) and a later call goes on from there; after
 a change of limn, remove it. The exit status is 1 where a check disagrees, or fewer than --at-least
@@ -63,7 +66,7 @@ SMOOTH = re.compile(r"\b(conductor|dielectric|thindielectric|plastic)\b")
 TIME_POWER = 2.5
 WANTED = 0.1  # of an error that shows, over all terms' magnitudes
 COARSELY, ZERO = "agree coarsely", "agree: zero"
-FORWARD, REVERSE, PATHS = "forward", "reverse", "paths"
+FORWARD, REVERSE, PATHS, SAME = "forward", "reverse", "paths", "same paths"
 # Kinds whose derivative has terms of edges or of the filter.
 MOVES = re.compile(r"sensor\..*|(light\.)?(translate|rotate|scale|vertex_positions|displacement)")
 DECIDED = ("disagree", "agree", "not complete")
@@ -243,6 +246,25 @@ def run_forward(arguments, check, parameter, spp):
     check.runs[parameter] = {**result, "wrt": wrt, "spp": spp, "seconds": user_seconds() - before}
 
 
+def run_same(arguments, scene, checks):
+    """All kinds of a scene in one run; or each in its own, where one is refused."""
+    wrts = [direction_of(arguments.output, *check.candidates[0], scene.description)
+            for check in checks]
+    reports, message = run_check(arguments, scene, [
+        "--same-paths", "--seed", "1", "--spp", str(PATHS_SPP),
+        *[option for wrt in wrts for option in ("--wrt", wrt)]])
+    if not reports and len(checks) > 1:
+        for check in checks:
+            run_same(arguments, scene, [check])
+        return
+    for check, wrt, report in zip(checks, wrts, reports or [{"verdict": "refused"}]):
+        if report["verdict"] == "refused":
+            report["message"] = message
+        elif report["gradient_sum"] == report["error"] == 0:
+            report["verdict"] = ZERO
+        check.runs[check.candidates[0][0]] = {"wrt": wrt, **report}
+
+
 def run_limn(arguments, scene, command, options):
     """The error message, "" where it ran."""
     done = subprocess.run([arguments.limn, command, scene.file, "--threads", "1", "--quiet",
@@ -328,12 +350,16 @@ def run_reverse(arguments, scene, checks, spp=REVERSE_SPP):
         run_reverse(arguments, scene, unclear, more)
 
 
+def modes_of(scene, moves):
+    edges = [] if scene.smooth else [REVERSE, FORWARD] if moves else [FORWARD]
+    return [*([] if moves else [SAME]), PATHS, *edges]
+
+
 def checks_of(scenes, results):
     checks = [Check(scene, kind, mode, candidates,
                     results.setdefault(f"{scene.name} {kind} {mode}", {}))
               for scene in scenes for kind, candidates in kinds_of(scene.info).items()
-              for mode in (PATHS, REVERSE, FORWARD)
-              if mode == PATHS or not scene.smooth and (mode == FORWARD or MOVES.fullmatch(kind))]
+              for mode in modes_of(scene, MOVES.fullmatch(kind))]
     before = collections.Counter()
     for check in checks:
         before[check.kind, check.mode] += 1
@@ -342,7 +368,7 @@ def checks_of(scenes, results):
 
 
 def work_off(arguments, checks, results):
-    """Runs along the same paths, reverse runs, then the forward run that comes first, until the
+    """Runs along equal paths, reverse runs, then the forward run that comes first, until the
     time is over."""
     end = time.monotonic() + 60 * arguments.minutes
 
@@ -352,7 +378,7 @@ def work_off(arguments, checks, results):
             run = list(check.runs.values())[-1]
             print(f"{check.scene.name:58} {check.mode} {run['wrt']}: {run['verdict']}", flush=True)
 
-    for mode, run_mode in ((PATHS, run_paths), (REVERSE, run_reverse)):
+    for mode, run_mode in ((SAME, run_same), (PATHS, run_paths), (REVERSE, run_reverse)):
         left = collections.defaultdict(list)
         for check in checks:
             if check.mode == mode and not check.runs:
@@ -437,7 +463,7 @@ def main():
     print(f"{counts['agree']} of {len(checks)} checks agree, {counts[COARSELY]} more coarsely, "
           f"{counts[ZERO]} are zero, {counts['disagree']} disagree, in {len(scenes)} scenes "
           f"({sum(scene.smooth for scene in scenes)} with smooth lobes); {left} can go on")
-    for mode in (PATHS, REVERSE, FORWARD):
+    for mode in (SAME, PATHS, REVERSE, FORWARD):
         print_scenes(mode, [check for check in checks if check.mode == mode])
     return 1 if counts["disagree"] or counts["agree"] < arguments.at_least else 0
 

@@ -10,4 +10,8 @@ namespace limn {
 // pixels where the file has none, and for other formats. InputError as read_image().
 Image read_alpha(const std::string& file);
 
+// As write_exr(), with alpha (H by W by 1) as channel A.
+void write_exr_with_alpha(const std::string& file, const Image& image, const Image& alpha,
+                          bool half, const std::vector<ImageAttribute>& attributes);
+
 }  // namespace limn

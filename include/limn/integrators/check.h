@@ -118,6 +118,22 @@ using GradientRun =
 CheckResult check(const Scene& scene, const CheckOptions& options, const RunSettings& settings,
                   const GradientRun& run = gradient);
 
+// A derivative against central differences along the very paths, up to a depth of 8, without noise:
+// only where no edge moves. What is left is the differences' own error, and the few paths that a
+// step leads elsewhere, as where a roughness changes what a smooth lobe weighs.
+struct PathsCheck {
+  double step = 0;
+  double gradient_sum = 0, difference_sum = 0;  // over the image
+  double error = 0;  // the sum over pixels of |gradient - differences|, over that of their means
+  bool interrupted = false;
+  NonFinite non_finite;
+  bool agrees() const { return error <= kMostError; }
+  static constexpr double kMostError = 1e-3;  // an error of a derivative is hardly ever smaller
+};
+// step: 0 for the one of several at which they differ least. InputError where edges or times move.
+PathsCheck check_paths(const Scene& scene, const std::string& parameter, double step,
+                       const RunSettings& settings);
+
 // Where a pixel is made of its faces (FilmPoints::kFaces) nothing is left to chance: the gradient
 // is held against central differences of the very image, at steps from options.step (0: the natural
 // one) down, of which the one is taken where they change least from step to step. They agree where

@@ -38,10 +38,12 @@ struct CentralDifferences {
 };
 // All jobs and steps share their random numbers. even: these are even in each batch (Rng::even),
 // for less error, mostly. What `check` states of steps and of rare events is of independent ones.
-// blur: of images of blurred faces, as resolved() has it.
+// blur: of images of blurred faces, as resolved() has it. same_paths: changed materials draw as the
+// unmoved ones.
 CentralDifferences central_differences(const Scene& scene, const std::vector<DifferenceJob>& jobs,
                                        int block, const RunSettings& settings, bool even = false,
-                                       const std::optional<Blur>& blur = std::nullopt);
+                                       const std::optional<Blur>& blur = std::nullopt,
+                                       bool same_paths = false);
 
 // Central differences for the steps h and 2h, and their Richardson combination
 // (4 D_h - D_2h) / 3, whose bias is of order h^4. All from the same samples; standard errors from

@@ -1,0 +1,93 @@
+// Derivatives without edges against differences along the same paths.
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "integrators/estimates/batches.h"
+#include "integrators/pilot/term_estimator.h"
+#include "limn/core/error.h"
+#include "limn/core/exposure.h"
+#include "limn/core/moved.h"
+#include "limn/core/parameter.h"
+#include "limn/edgetree/edge_sampler_types.h"
+#include "limn/integrators/check.h"
+
+namespace limn {
+namespace {
+
+// Deeper in glass the least step leads paths elsewhere.
+constexpr int kMostDepth = 8;
+// Over the natural one. Long steps bend, short ones round.
+constexpr double kSteps[] = {1, 1e-2, 1e-4};
+
+std::vector<double> derivative_of(const Scene& scene, const Parameter& parameter,
+                                  const RunSettings& settings, PathsCheck& check) {
+  const EdgeSamplerType& sampler = edge_sampler_types().front();
+  const std::vector<const TermType*> types = terms_of(scene, sampler, false);
+  std::vector<std::unique_ptr<SampleEstimator>> list;
+  list.push_back(std::make_unique<TermEstimator>(
+      scene, std::span(&parameter, 1), types, std::vector<bool>(types.size(), true), sampler,
+      settings.threads, TermExtras{.of_differences = true}));
+  check_memory(list);
+  // Where no edge moves, no other has samples.
+  const size_t slot = list[0]->pixel_slot();
+  Moments image(film_size(scene.film));
+  run_batches(list, settings, Stopwatch(), [&](const Batch& batch, const auto& sums) {
+    image.add_batch(sums[0].images[slot], batch.count());
+    check.non_finite.merge(sums[0].non_finite);
+  });
+  std::vector<double> means(image.size());
+  for (size_t i = 0; i < means.size(); ++i) means[i] = image.mean(i);
+  return means;
+}
+
+}  // namespace
+
+PathsCheck check_paths(const Scene& whole, const std::string& name, double step,
+                       const RunSettings& settings) {
+  Scene scene = whole;
+  if (scene.max_depth < 0 || scene.max_depth > kMostDepth) scene.max_depth = kMostDepth;
+  const Parameter parameter = find_parameter(scene, name);
+  if (moved_in(scene, {&parameter, 1}).any()) {
+    throw InputError(
+        "--same-paths: \"" + name +
+        "\" moves edges or where paths go, which differences along the same paths miss: "
+        "leave it out");
+  }
+  check_still(scene, "--same-paths");
+  DifferenceJob job{name, {}, {}};
+  for (const double share : kSteps) job.steps.push_back(share * parameter.natural_step);
+  if (step > 0) job.steps = {step};
+  for (size_t k = 0; k < job.steps.size(); ++k) {
+    job.combinations.emplace_back(job.steps.size());
+    job.combinations[k][k] = 1;
+  }
+  PathsCheck check;
+  const std::vector<double> gradient = derivative_of(scene, parameter, settings, check);
+  const CentralDifferences run =
+      central_differences(scene, {job}, 0, settings, false, std::nullopt, true);
+  check.non_finite.merge(run.non_finite);
+  check.interrupted = settings.interrupted && settings.interrupted->load();
+  check.error = INFINITY;
+  for (size_t k = 0; k < job.steps.size() && !check.interrupted; ++k) {
+    const Moments& differences = run.estimates[0][k].total;
+    double sums[2] = {0, 0}, apart = 0, both = 0;
+    for (size_t i = 0; i < gradient.size(); ++i) {
+      const double a = gradient[i], b = differences.mean(i);
+      sums[0] += a;
+      sums[1] += b;
+      apart += std::fabs(a - b);
+      both += 0.5 * (std::fabs(a) + std::fabs(b));
+    }
+    const double error = apart > 0 ? apart / both : 0;
+    if (error < check.error) {
+      check.step = job.steps[k];
+      check.gradient_sum = sums[0];
+      check.difference_sum = sums[1];
+      check.error = error;
+    }
+  }
+  return check;
+}
+
+}  // namespace limn
