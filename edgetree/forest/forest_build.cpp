@@ -389,20 +389,10 @@ uint32_t append_motion(const EdgeMesh& mesh, const Lanes& lane_scale, Forest& fo
   return static_cast<uint32_t>(forest.motions.size() - 1);
 }
 
-// Nodes have six to seven edges, and three to four children. An array that grew would double for
-// the few nodes of a small shape behind a large one; what is reserved and not used takes no memory.
-void reserve_nodes(const EdgeSamplerInput& input, Forest& forest) {
-  size_t edges = 0;
-  for (const EdgeMesh& mesh : input.objects) edges += mesh.edges.size();
-  forest.edges.reserve(edges / 6 + input.objects.size());
-  forest.inner.reserve(edges / 20 + input.objects.size());
-}
-
 }  // namespace
 
 Forest build_forest(const EdgeSamplerInput& input, int threads, const ForestConfig& config) {
   Forest forest;
-  reserve_nodes(input, forest);
   forest.motions.emplace_back();
   std::vector<uint32_t> motions;
   for (const EdgeMesh& mesh : input.objects)

@@ -6,6 +6,7 @@
 #include <map>
 
 #include "limn/core/advice.h"
+#include "limn/core/coverage.h"
 #include "limn/core/error.h"
 #include "limn/core/field_error.h"
 #include "limn/core/names.h"
@@ -306,6 +307,12 @@ nb::class_<SceneHandle> bind_scene(nb::module_& m) {
         "smooth_as: the roughness (GGX) that smooth conductors, dielectrics and plastics get, so "
         "that derivatives have all edges (0.003), plastics a few percent darker; 0: they stay "
         "smooth. Raises limn.InputError with file, line and column.");
+  m.def(
+      "coverage", [](const SceneHandle& s) { return SceneHandle(coverage_of(s.get())); },
+      nb::arg("scene"), nb::sig("def coverage(scene: Scene) -> Scene"),
+      "A scene whose image is the coverage (alpha) of `scene` less 1: for derivatives of coverage, "
+      "and losses against masks less 1. It has the parameters of shapes and cameras; every surface "
+      "covers, whatever its material.");
   m.def("advice_on", advice_on, nb::arg("type"),
         "\"; \" and what to write in place of a type of Mitsuba's that limn lacks, or \"\".");
   m.def("load_placed", load_placed, nb::arg("xml"), nb::arg("folder"), nb::arg("places"),
