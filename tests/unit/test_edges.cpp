@@ -168,7 +168,7 @@ Mesh cube_with_t_junction(const std::vector<Vec3f>& middles, const std::vector<F
     if (*std::min_element(f.begin(), f.end()) < 4) faces.push_back(f);
   faces.insert(faces.end(), top.begin(), top.end());
   faces.insert(faces.end(), fill.begin(), fill.end());
-  cube.positions.insert(cube.positions.end(), middles.begin(), middles.end());
+  for (const Vec3f& middle : middles) cube.positions.push_back(middle);
   return make_mesh(cube.positions, faces);
 }
 

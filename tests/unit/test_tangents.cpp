@@ -52,7 +52,8 @@ TEST(Tangents, FacesOfOneChartShareThem) {
   EXPECT_NEAR(dot(tangent_at(mirrored, FaceId(2), 0, 0), normalize(Vec3d{1, 0, -1})), 1, 1e-12);
   Mesh around =
       textured(roof, faces, {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {1, 0, 0}, {1, 1, 0}});
-  around.uv_places.insert(around.uv_places.end(), {{0, 0, 0}, {0, 1, 0}});
+  around.uv_places.push_back({0, 0, 0});
+  around.uv_places.push_back({0, 1, 0});
   around.uv_ids[2] = {6, 4, 5};
   around.uv_ids[3] = {6, 5, 7};
   update_shading_normals(around);
