@@ -70,6 +70,7 @@ Bounds WedgeList::bounds(EdgeRange range) const {
 }
 
 std::span<const Wedge> WedgeWindow::wedges(EdgeRange range) {
+  if (range.size() == 0) return {};
   if (range.begin < range_.begin || range.end > range_.end) {
     range_ = range;
     wedges_.clear();

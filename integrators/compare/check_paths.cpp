@@ -43,10 +43,7 @@ std::vector<double> derivative_of(const Scene& scene, const Parameter& parameter
 
 }  // namespace
 
-PathsCheck check_paths(const Scene& whole, const std::string& name, double step,
-                       const RunSettings& settings) {
-  Scene scene = whole;
-  if (scene.max_depth < 0 || scene.max_depth > kMostDepth) scene.max_depth = kMostDepth;
+void refuse_moved_paths(const Scene& scene, const std::string& name) {
   const Parameter parameter = find_parameter(scene, name);
   if (moved_in(scene, {&parameter, 1}).any()) {
     throw InputError(
@@ -55,6 +52,14 @@ PathsCheck check_paths(const Scene& whole, const std::string& name, double step,
         "leave it out");
   }
   check_still(scene, "--same-paths");
+}
+
+PathsCheck check_paths(const Scene& whole, const std::string& name, double step,
+                       const RunSettings& settings) {
+  Scene scene = whole;
+  if (scene.max_depth < 0 || scene.max_depth > kMostDepth) scene.max_depth = kMostDepth;
+  refuse_moved_paths(scene, name);
+  const Parameter parameter = find_parameter(scene, name);
   DifferenceJob job{name, {}, {}};
   for (const double share : kSteps) job.steps.push_back(share * parameter.natural_step);
   if (step > 0) job.steps = {step};

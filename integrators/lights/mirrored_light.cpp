@@ -50,7 +50,8 @@ Vec3d start_of(const MirroredLight::Highlight& highlight) {
 Vec3d place_in(const Vec3d& center, double radius, const Vec3d& shown, const Vec3d& foot) {
   if (length(shown - center) <= radius) return shown;
   const Vec3d line = shown - foot;
-  const double along = dot(center - foot, line) / length_squared(line);
+  const double square = length_squared(line);
+  const double along = square > 0 ? dot(center - foot, line) / square : 0;
   const Vec3d x = foot + line * std::clamp(along, 0.0, 1.0), off = x - center;
   return length(off) <= radius ? x : center + normalize(off) * radius;
 }

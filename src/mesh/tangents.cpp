@@ -50,6 +50,9 @@ void Tangents::assign(size_t n, const Vec3<Lanes>& v) {
 }
 
 void Tangents::resize(size_t n) {
+  if (n == 0) return clear();
+  if (n < size_ && !one_) data_.resize(stride() * n);
+  size_ = std::min(size_, n);
   while (size_ < n) push_back({});
 }
 

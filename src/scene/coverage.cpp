@@ -1,14 +1,20 @@
 // Coverage as an image: all that is not covered shows a sky of radiance -1.
 #include "limn/core/coverage.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
+#include "limn/core/error.h"
 #include "limn/core/exposure.h"
 #include "limn/core/image_alpha.h"
 #include "limn/core/make_bsdf.h"
 
 namespace limn {
 namespace {
+
+// Of half floats and filters, far below what a mask in other units has.
+constexpr float kRounding = 0x1p-10f;
 
 void remove_emitters(Scene& scene) {
   for (size_t s = scene.shapes.size(); s-- > 0;) {
@@ -45,8 +51,9 @@ Scene coverage_of(const Scene& scene) {
 
 Image read_coverage(const std::string& file) {
   Image mask = read_alpha(file);
+  // Programs add a channel without holes to any PNG: then the mask is in its colours.
   const bool opaque = std::ranges::all_of(mask.data, [](float alpha) { return alpha >= 1; });
-  if (opaque) {
+  if (mask.data.empty() || (opaque && !file.ends_with(".exr"))) {
     const StoredImage stored = read_stored_image(file);
     mask = Image(stored.width, stored.height, 1);
     for (size_t i = 0; i < mask.data.size() * stored.channels; ++i) {
@@ -55,7 +62,13 @@ Image read_coverage(const std::string& file) {
       mask.data[i / stored.channels] += value / static_cast<float>(stored.channels);
     }
   }
-  for (float& value : mask.data) value -= 1;
+  for (float& value : mask.data) {
+    if (!(value >= -kRounding && value <= 1 + kRounding)) {
+      throw InputError(
+          {file}, fmt::format("a mask of coverage has values from 0 to 1, this one {:g}", value));
+    }
+    value -= 1;
+  }
   return mask;
 }
 

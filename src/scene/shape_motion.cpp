@@ -1,5 +1,6 @@
 // Motions of a shape's vertices: rigid, scaling, along a field, single vertices.
 #include <algorithm>
+#include <utility>
 
 #include "limn/core/check.h"
 #include "limn/core/displacement.h"
@@ -116,7 +117,8 @@ class ShapeRotation final : public ShapeMotion {
   }
   void seed_given_normals(Mesh& mesh, int lane) const override {
     std::vector<Vec3d> turns;
-    for (const Vec3d& n : mesh.normals) turns.push_back(cross(unit_vector(axis_), n));
+    for (const Vec3d& n : std::as_const(mesh).normals)
+      turns.push_back(cross(unit_vector(axis_), n));
     add_to_lane(mesh.normal_tangents, lane, turns);
   }
   void move_vertices(Shape& shape, double step, size_t) const override {

@@ -387,11 +387,9 @@ TEST(EdgePieces, DoNotCancel) {
   edge.vertices = {VertexId(0), VertexId(1)};
   c.mesh.edges = {edge};
   const auto weight = [&](const Vec3d& v0, const Vec3d& v1) {
-    c.mesh.tangents.assign(2, {});
-    for (int i = 0; i < 3; ++i) {
-      c.mesh.tangents[0][i][0] = v0[i];
-      c.mesh.tangents[1][i][0] = v1[i];
-    }
+    c.mesh.tangents.clear();
+    for (const Vec3d& v : {v0, v1})
+      c.mesh.tangents.push_back({{v.x, 0, 0, 0}, {v.y, 0, 0, 0}, {v.z, 0, 0, 0}});
     const std::vector<EdgePiece> pieces = pieces_of(c);
     return pieces.empty() ? 0 : pieces[0].weight;
   };

@@ -159,6 +159,9 @@ class BackwardCommand final : public Command {
     }
     settings.seconds *= kImageShare;
     const bool alpha = common_.what == "alpha";
+    if (alpha && loss_.kind == LossKind::kRelativeL2) {
+      throw InputError("--what alpha: a loss relative to coverage means little: --loss l2 or l1");
+    }
     const Image target = alpha ? read_coverage(target_) : read_image(target_);
     check_loss_images(scene, target, {}, target_);
     loss_.method = loss_method(options_.method);

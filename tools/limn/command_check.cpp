@@ -183,7 +183,7 @@ class CheckCommand final : public Command {
     app.add_flag("--same-paths", same_paths_,
                  "Compare with differences along the same paths instead, up to depth 8, without "
                  "noise: finds errors of a thousandth in the derivatives of values, texels and "
-                 "lights. Nothing that moves edges")
+                 "lights. Refuses parameters that move edges or paths")
         ->excludes("--time")
         ->excludes("--reverse");
   }
@@ -271,6 +271,7 @@ class CheckCommand final : public Command {
   int run_paths(const Scene& scene) {
     refuse_options(*app_, {"--method", "--terms", "--samples", "--block", "--points"},
                    "not with --same-paths, which has paths of its own");
+    for (const auto& parameter : parameters_) refuse_moved_paths(scene, parameter);
     json report = json::array();
     int status = kSuccess;
     for (const auto& parameter : parameters_) {
@@ -281,7 +282,8 @@ class CheckCommand final : public Command {
       fmt::print(
           "{}: sum over the image: gradient {:.8g}, differences along the same paths {:.8g} (step "
           "{:.3g})\n  pixels differ by {:.2g} of the derivative: {}\n",
-          parameter, r.gradient_sum, r.difference_sum, r.step, r.error, verdict_name(verdict));
+          parameter, r.gradient_sum, r.difference_sum, r.step, r.error,
+          r.is_zero() ? "agree: both are zero" : verdict_name(verdict));
       report.push_back({{"parameter", parameter},
                         {"step", r.step},
                         {"verdict", verdict_name(verdict)},

@@ -91,14 +91,16 @@ void FitCommand::add_options(CLI::App& app) {
          "Target image (.exr), one for each sensor of the scene, then of each --view (repeatable)")
       ->type_name("EXR")
       ->allow_extra_args(false);
-  app.add_option(
-         "--mask", masks_,
-         "Image of pixel weights (.exr), one for each target in turn; \"-\" for none (repeatable)")
+  app.add_option("--mask", masks_,
+                 "Image of weights of a target's pixels (.exr), one for each target in turn; \"-\" "
+                 "for none "
+                 "(repeatable)")
       ->type_name("EXR")
       ->allow_extra_args(false);
-  app.add_option("--alpha", alphas_,
-                 "Mask that the coverage of a target's view is compared with, one for each target "
-                 "in turn, which may be \"-\"; \"-\" for none (repeatable)")
+  app.add_option(
+         "--alpha", alphas_,
+         "Mask (.exr, .png, .jpg) for the coverage of a view, one for each --target in turn; "
+         "\"-\" for none. With --target - the view has a mask alone (repeatable)")
       ->type_name("IMAGE")
       ->allow_extra_args(false);
   app.add_option("--view", views_, "Further scene that shares the parameters (repeatable)")
@@ -180,6 +182,7 @@ std::vector<ViewArguments> FitCommand::with_targets(const std::vector<ViewArgume
     if (!view.target.empty()) all.push_back(view);
     view.target = given(alphas_, v);
     view.alpha = true;
+    view.mask.clear();
     if (!view.target.empty()) all.push_back(view);
     if (all.size() == before) throw InputError("--target - needs an --alpha of this view");
   }

@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <sstream>
 
+#include "limn/core/error.h"
+#include "limn/core/exposure.h"
 #include "limn/core/image_alpha.h"
 #include "limn/core/names.h"
 #include "limn/integrators/layers.h"
@@ -53,6 +55,7 @@ class RenderCommand final : public Command {
     const bool layers = check_what();
     check_options();
     const Scene scene = load_scene(common_, warnings_);
+    if (alpha_) check_still(scene, "--alpha");
     const RunSettings settings =
         settings_for(options_.points, make_settings(common_, scene, name()));
     if (layers) return write_layers(scene, settings, command_line);
@@ -131,6 +134,9 @@ class RenderCommand final : public Command {
   }
   void check_options() const {
     check_image_options(*app_, {options_.method});
+    if (alpha_ && options_.points == FilmPoints::kFaces) {
+      throw InputError("--alpha takes a ray per sample, points \"faces\" have no samples");
+    }
     refuse_samples(*app_, options_.points, {"--spp", "--time", "--part"}, options_);
     if (!has_generator() && options_.points == FilmPoints::kRandom) {
       refuse_options(*app_, {"--generator"},

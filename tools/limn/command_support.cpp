@@ -110,7 +110,7 @@ void add_time_option(CLI::App& app, CommonOptions& common) {
 void add_what_option(CLI::App& app, CommonOptions& common) {
   app.add_option("--what", common.what,
                  "Of what: the image, or alpha, the share of each pixel that surfaces cover "
-                 "(whatever their material)")
+                 "(whatever their material), in each channel")
       ->check(CLI::IsMember({"image", "alpha"}))
       ->capture_default_str();
 }

@@ -249,7 +249,7 @@ std::vector<FaceIndices> to_faces(nb::handle array) {
 }
 
 Positions view_positions(Kept scene, ShapeId shape) {
-  const std::vector<Vec3f>& positions = scene->shape(shape).mesh.positions;
+  const SharedVector<Vec3f>& positions = scene->shape(shape).mesh.positions;
   static_assert(sizeof(Vec3f) == 3 * sizeof(float));
   const float* first = &positions.front().x;
   const size_t count = positions.size();

@@ -128,11 +128,14 @@ struct PathsCheck {
   bool interrupted = false;
   NonFinite non_finite;
   bool agrees() const { return error <= kMostError; }
+  bool is_zero() const { return error == 0 && gradient_sum == 0 && difference_sum == 0; }
   static constexpr double kMostError = 1e-3;  // an error of a derivative is hardly ever smaller
 };
 // step: 0 for the one of several at which they differ least. InputError where edges or times move.
 PathsCheck check_paths(const Scene& scene, const std::string& parameter, double step,
                        const RunSettings& settings);
+// The same InputError, at once.
+void refuse_moved_paths(const Scene& scene, const std::string& parameter);
 
 // Where a pixel is made of its faces (FilmPoints::kFaces) nothing is left to chance: the gradient
 // is held against central differences of the very image, at steps from options.step (0: the natural
