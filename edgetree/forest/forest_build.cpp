@@ -143,7 +143,7 @@ class TreeFiller {
   }
 
  private:
-  // Of so many edges the whole wedges are made once for all nodes above them.
+  // Whole wedges of at most so many edges are made once, for all nodes over them.
   static constexpr uint32_t kWindow = 4096;  // not tuned
 
   std::span<const Wedge> edges(EdgeRange range) { return window_.wedges(range); }

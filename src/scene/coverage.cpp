@@ -13,7 +13,7 @@
 namespace limn {
 namespace {
 
-// Of half floats and filters, far below what a mask in other units has.
+// How far values may lie outside of 0 to 1: rounding to half floats takes them there.
 constexpr float kRounding = 0x1p-10f;
 
 void remove_emitters(Scene& scene) {

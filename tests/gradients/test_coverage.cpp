@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "limn/core/error.h"
 #include "limn/core/image_alpha.h"
 #include "limn/core/parameter.h"
 #include "limn/integrators/backward.h"
@@ -102,6 +103,12 @@ TEST(Coverage, IsReadFromMasks) {
   write_exr_with_alpha(files.path("alpha.exr"), grey, alpha, false, {});
   EXPECT_EQ(read_coverage(files.path("alpha.exr")).data, (std::vector<float>{-0.5, 0}));
   EXPECT_EQ(read_image(files.path("alpha.exr")).data, grey.data);
+  alpha.data = {1, 1};  // all is covered, whatever its colours
+  write_exr_with_alpha(files.path("covered.exr"), grey, alpha, false, {});
+  EXPECT_EQ(read_coverage(files.path("covered.exr")).data, (std::vector<float>{0, 0}));
+  grey.data = {0, 255};
+  write_exr(files.path("bytes.exr"), grey, false, {});
+  EXPECT_THROW(read_coverage(files.path("bytes.exr")), InputError);
   // Several lines to a block, of halves.
   const Image colours(4, 20, 3), all(4, 20, 1);
   write_exr_with_alpha(files.path("halves.exr"), colours, all, true, {});

@@ -93,8 +93,7 @@ void FitCommand::add_options(CLI::App& app) {
       ->allow_extra_args(false);
   app.add_option("--mask", masks_,
                  "Image of weights of a target's pixels (.exr), one for each target in turn; \"-\" "
-                 "for none "
-                 "(repeatable)")
+                 "for none (repeatable)")
       ->type_name("EXR")
       ->allow_extra_args(false);
   app.add_option(

@@ -13,9 +13,10 @@ namespace limn {
 // material, a surface covers what lies behind it; emitters do not with hide_emitters.
 Scene coverage_of(const Scene& scene);
 
-// A mask as a target of coverage_of(): 1 subtracted from the file's alpha channel where it is not 1
-// everywhere, else from the mean of its channels as they are stored (eight bits without sRGB's
-// transfer function). H by W by 1; InputError as read_image().
+// A mask as a target of coverage_of(): 1 subtracted from the file's alpha channel, if it is an EXR
+// or the channel is not 1 everywhere, else from the mean of its channels as they are stored (eight
+// bits without sRGB's transfer function). H by W by 1; InputError as read_image(), and for values
+// outside of 0 to 1.
 Image read_coverage(const std::string& file);
 
 }  // namespace limn

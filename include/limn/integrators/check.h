@@ -134,7 +134,7 @@ struct PathsCheck {
 // step: 0 for the one of several at which they differ least. InputError where edges or times move.
 PathsCheck check_paths(const Scene& scene, const std::string& parameter, double step,
                        const RunSettings& settings);
-// The same InputError, at once.
+// Throws the InputError of check_paths(), before any work.
 void refuse_moved_paths(const Scene& scene, const std::string& parameter);
 
 // Where a pixel is made of its faces (FilmPoints::kFaces) nothing is left to chance: the gradient
