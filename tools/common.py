@@ -50,6 +50,13 @@ def find_limn(given, *targets):
     return program
 
 
+def commit_line():
+    """Of the commit that lies here, for figures that are published; tools/release reads it."""
+    commit = subprocess.run(["git", "rev-parse", "--short=8", "HEAD"], cwd=ROOT, text=True,
+                            capture_output=True, check=False).stdout.strip()
+    return f"Figures: commit `{commit or 'unknown'}`."
+
+
 def read_json(file):
     """None if it cannot be read."""
     try:

@@ -92,10 +92,8 @@ class Fits:
             if done["steps"] < steps:
                 seconds = self.run("fit", "--resume", out, "--steps", str(steps))
         else:
-            # Four times the default: what the figures in README.md were taken with.
-            samples = [] if "--points" in options else ["--camera-samples", "1"]
             seconds = self.run("fit", scene(name), *repeated("--target", targets), "--steps",
-                               str(steps), *samples, "-o", out, *defined(defines), *options.split())
+                               str(steps), "-o", out, *defined(defines), *options.split())
         known = read_json(times)
         if seconds and (known is not None or not done):
             known = (known or 0) + seconds

@@ -5,6 +5,7 @@ of the scripts does nothing else. tools/history: rows of commits that are not he
 
 import os
 import random
+import re
 import subprocess
 import sys
 import tempfile
@@ -21,6 +22,7 @@ from needs import need_matplotlib  # noqa: E402
 
 need_matplotlib()
 
+import common  # noqa: E402
 import repeated  # noqa: E402
 from paper_figures import ablations  # noqa: E402
 from report.python import SYSTEM_PYTHON, use_one_with_matplotlib  # noqa: E402
@@ -37,7 +39,7 @@ VERDICTS = """
 |---|---|---|---|
 | contact | gap: 0.1 … 0 | right | biased at 1e-3, 1e-4; noisy at 0.01 |
 
-Each run takes 0.137 s.
+Each run takes 0.137 s. Figures: commit `0123abcd`.
 """
 
 
@@ -143,7 +145,7 @@ class Stale(unittest.TestCase):
             self.assertTrue(calls)
             self.assertEqual([c for c in calls if "--again" not in c.split()], [])
 
-    def test_words_do_not_make_figures_young(self):
+    def test_pages_say_of_which_commit_their_figures_are(self):
         release = script("release")
         release.FIGURES, release.CODE = ["page.md"], ["code"]
         with tempfile.TemporaryDirectory() as release.ROOT:
@@ -152,16 +154,28 @@ class Stale(unittest.TestCase):
                     stream.write(text)
                 release.git("add", name)
                 release.git("-c", "user.name=a", "-c", "user.email=a@b", "commit", "-m", name)
+                return release.git("rev-parse", "--short=8", "HEAD")
 
             release.git("init", "--quiet")
-            commit("page.md", "In 2 scenes:\n\n| scene | time |\n|---|---|\n| plant | 0.5 |\n")
+            commit("page.md", "| plant | 0.5 |\n")
+            self.assertEqual(list(release.stale_figures()),
+                             ["page.md: does not say of which commit its figures are"])
+            first = commit("code", "fast")
+            page = f"Figures: commit `{first}`.\n"
+            commit("page.md", page)
             self.assertEqual(list(release.stale_figures()), [])
-            commit("code", "faster")
-            commit("page.md", "Of 2 scenes:\n\n| scene | time |\n|---|---|\n| plant | 0.5 |\n")
-            (line,) = release.stale_figures()
-            self.assertTrue(line.startswith("page.md: 1 commits changed code"), line)
-            commit("page.md", "In 2 scenes:\n\n| scene | time |\n|---|---|\n| plant | 0.4 |\n")
-            self.assertEqual(list(release.stale_figures()), [])
+            second = commit("code", "faster")
+            commit("page.md", page + f"Others: commit `{second}`.\nMore: commit `0123456789`.\n")
+            self.assertEqual(list(release.stale_figures()), [
+                f"page.md: figures of {first}; 1 commits changed code since",
+                "page.md: figures of 0123456789; ? commits changed code since"])
+
+    def test_what_is_published_names_its_commit(self):
+        release = script("release")
+        name = release.git("rev-parse", "--short=8", "HEAD") or "unknown"
+        self.assertEqual(common.commit_line(), f"Figures: commit `{name}`.")
+        self.assertEqual([page for page in release.FIGURES
+                          if not re.search(r"\bcommit\s+`[0-9a-f]{8}`", repeated.read(page))], [])
 
 
 if __name__ == "__main__":

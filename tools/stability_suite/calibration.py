@@ -12,7 +12,7 @@ import textwrap
 
 import exr
 import numpy as np
-from common import read_json, write_json
+from common import commit_line, read_json, write_json
 from report import charts
 from report.charts import FAINT, TEXT
 from report.colours import Palette
@@ -163,6 +163,7 @@ def markdown(rows):
                  f" off by more than three errors; the most extreme ratios are ")
         text += ", ".join(f"{_number(r['sum'])} ({r['scene']}, `{r['method']}`)"
                           for r in worst_rows(rows)) + "."
+    text += f" {commit_line()}"
     return "\n".join(textwrap.wrap(text, 100)) + "\n"
 
 
