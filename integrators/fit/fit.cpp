@@ -94,7 +94,8 @@ void free_normals(Scene& scene, const std::string& name, std::vector<std::string
     warnings.push_back("\"" + scene.shapes[s].id +
                        "\" has normals of its own: they are computed from its faces instead, "
                        "so that they follow its vertices");
-    set_mesh(scene, ShapeId(s), mesh.positions, mesh.faces, nullptr);
+    set_mesh(scene, ShapeId(s), std::vector<Vec3f>(mesh.positions),
+             std::vector<FaceIndices>(mesh.faces), nullptr);
   }
 }
 
@@ -382,7 +383,8 @@ FitState Fit::Impl::state() const {
                         course_numbers(scene, moved_shapes(v)), {}};
     for (const ShapeId s : moved_shapes(v)) {
       const Mesh& mesh = scene.shape(s).mesh;
-      view.shapes.push_back({mesh.positions, mesh.normals, mesh.faces});
+      view.shapes.push_back({std::vector<Vec3f>(mesh.positions), std::vector<Vec3d>(mesh.normals),
+                             std::vector<FaceIndices>(mesh.faces)});
       view.pivots.emplace_back();
       if (const std::optional<Pivot>& p = scene.shape(s).pivot) {
         view.pivots.back() = {p->center.x, p->center.y, p->center.z, p->size};

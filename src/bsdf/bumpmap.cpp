@@ -22,7 +22,7 @@ class BumpMap final : public MappedNormal<BumpMap> {
     const auto vector_at = [&](int k) { return Vec3<S>{at[k].r, at[k].g, at[k].b}; };
     const Vec3<S> g = vector_at(gradient_.texture), n_g = vector_at(outward_);
     const Vec3<S> along = g - n_g * (dot(g, n) / dot(n_g, n));
-    return normalize(n - along * scale_);
+    return normalize(n - along * (scale_ * turned(side_of(n, n_g))));
   }
 
   bool map_is_constant() const { return true; }

@@ -142,11 +142,12 @@ double read_relative_ior(Properties& properties, const std::string& inside) {
 ConductorIndices read_conductor_indices(Properties& properties) {
   const std::string name = properties.string("material", "none");
   ConductorIndices read{properties.rgb("eta", grey(0.0)), properties.rgb("k", grey(1.0))};
+  const double outside = read_ior(properties, "ext_eta", "vacuum");  // of formats before 2.0.0
   if (name == "none") {
     for (int i = 0; i < 3; ++i) {
       // Colours of spectra may be negative. Reflectances depend on squares alone.
-      read.eta[i] = std::fabs(read.eta[i]);
-      read.k[i] = std::fabs(read.k[i]);
+      read.eta[i] = std::fabs(read.eta[i]) / outside;
+      read.k[i] = std::fabs(read.k[i]) / outside;
       if (read.eta[i] == 0 && read.k[i] == 0) {
         properties.fail("k", "eta and k are both 0 in a channel");
       }
@@ -156,7 +157,8 @@ ConductorIndices read_conductor_indices(Properties& properties) {
   if (properties.has("eta") || properties.has("k")) {
     properties.fail("material", "give either a material or (eta, k), not both");
   }
-  if (const Metal* metal = find_metal(name)) return {metal->eta, metal->k};
+  if (const Metal* metal = find_metal(name))
+    return {metal->eta * (1 / outside), metal->k * (1 / outside)};
   std::vector<std::string> known = names_of(kMetals);
   known.insert(known.begin(), "none");
   properties.fail("material", unknown_name("material", name, known));

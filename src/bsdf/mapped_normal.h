@@ -12,7 +12,7 @@ struct MappedNormalOptions {
   bool shadows = true;  // Mitsuba's shading; any other has them always
 };
 MappedNormalOptions read_mapped_normal_options(Properties& properties);
-// The BSDF inside, opaque and of the front alone, beside `own` textures.
+// The BSDF inside, opaque and of the front alone or alike on both sides, beside `own` textures.
 std::shared_ptr<Bsdf> read_mapped_bsdf(Properties& properties, int own);
 
 // The nested BSDF about the normal n_b of a map. Where n_b turns from the viewer, n_b.wi < e, it is
@@ -70,6 +70,7 @@ class MappedNormal : public Bsdf {
     return nested_->scattering_normal(bent(n, wi, at), wi, inner(at));
   }
   LobeSummary lobe(const Rgb<double>* at) const final { return nested_->lobe(inner(at)); }
+  const Bsdf* side(bool front) const final { return front || two_sided_ ? this : nullptr; }
   // Its own textures, then those of the nested BSDF.
   Texture& texture(int k) const final {
     return k < own_ ? Bsdf::texture(k) : nested_->texture(k - own_);
@@ -87,6 +88,7 @@ class MappedNormal : public Bsdf {
   MappedNormal(std::shared_ptr<Bsdf> nested, const MappedNormalOptions& options)
       : nested_(std::move(nested)), options_(options) {
     lobes_ = nested_->lobes();
+    two_sided_ = nested_->side(false) != nullptr;
   }
   // For clone(), of a copy.
   void clone_nested() { nested_ = nested_->clone(); }
@@ -96,6 +98,14 @@ class MappedNormal : public Bsdf {
     texture_count_ += nested_->texture_count();
   }
   const Bsdf& inside() const { return *nested_; }
+  // -1 where the surface is seen from the back, else 1. outward: the value of make_outward().
+  template <class S>
+  static double side_of(const Vec3<S>& n, const Vec3<S>& outward) {
+    return dot(value(n), value(outward)) < 0 ? -1 : 1;
+  }
+  // -1 where the map's slopes count the other way: from the back, where the map bends the normal
+  // first and the BSDF inside turns it. Inside twosided, the surface is turned first (Mitsuba).
+  double turned(double side) const { return two_sided_ ? side : 1; }
 
  private:
   static bool is_seen(const Vec3d& n, const Vec3d& wi, const Vec3d& wo) {
@@ -149,8 +159,8 @@ class MappedNormal : public Bsdf {
 
   std::shared_ptr<Bsdf> nested_;
   MappedNormalOptions options_;
-  bool mitsuba_ = false;
-  int own_ = 0;  // number of its own textures
+  bool mitsuba_ = false, two_sided_ = false;  // two_sided_: the BSDF inside is
+  int own_ = 0;                               // number of its own textures
 };
 
 }  // namespace limn

@@ -19,15 +19,16 @@ class NormalMap final : public MappedNormal<NormalMap> {
     add_nested_textures();
   }
 
-  // The colour t stands for 2 t - 1. Seen from the back, the bitangent stays.
+  // The colour t stands for 2 t - 1. Seen from the back, tangent and bitangent stay, or both turn.
   template <class S>
   Vec3<S> normal(const Vec3<S>& n, const Rgb<S>* at) const {
     const auto vector_at = [&](int k) { return Vec3<S>{at[k].r, at[k].g, at[k].b}; };
     const Rgb<S> t = map_.of(at);
     const Vec3<S> m = Vec3<S>{t.r, t.g, t.b} * 2.0 - Vec3<S>{1.0, 1.0, 1.0};
     const Vec3<S> s = along_surface(n, vector_at(tangent_));
-    const double side = dot(value(n), value(vector_at(outward_))) < 0 ? -1 : 1;
-    const Vec3<S> sum = s * m.x + cross(n, s) * (m.y * side) + n * m.z;
+    const double side = side_of(n, vector_at(outward_));
+    const Vec3<S> sum =
+        s * (m.x * turned(side)) + cross(n, s) * (m.y * side * turned(side)) + n * m.z;
     return value(length_squared(sum)) > 0 ? normalize(sum) : n;
   }
 
@@ -67,7 +68,9 @@ std::shared_ptr<Bsdf> read_mapped_bsdf(Properties& properties, int own) {
   if (nested->lobes().through) {
     properties.fail("takes no bsdf that passes light (remove the map): " + nested->describe());
   }
-  if (nested->side(false)) properties.fail("takes no bsdf of two sides: put it inside twosided");
+  if (nested->side(false) && nested->side(false) != nested->side(true)) {
+    properties.fail("takes no twosided of two bsdfs: put a map into each of them");
+  }
   return nested;
 }
 

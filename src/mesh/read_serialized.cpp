@@ -67,9 +67,9 @@ class MeshReader {
   SerializedMesh read() {
     SerializedMesh result;
     const auto flags = take<uint32_t>();
-    is_double_ = (flags & kDouble) != 0;
-    if (is_double_ == ((flags & kSingle) != 0)) {
-      file_.fail("positions are neither single nor double");
+    is_double_ = (flags & kDouble) != 0;  // without either, as some exporters write it, single
+    if (is_double_ && (flags & kSingle) != 0) {
+      file_.fail("positions are said to be both single and double");
     }
     for (int length = 0; version_ == 4 && take<char>() != 0; ++length) {
       if (length == 65536) file_.fail("the name of a mesh is too long");

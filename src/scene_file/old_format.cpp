@@ -1,14 +1,28 @@
 // Renames the parameters of formats before 2.0.0, and replaces types that are gone.
 #include "src/scene_file/old_format.h"
 
-#include <algorithm>
+#include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <optional>
+
+#include "limn/core/image.h"
 #include "src/base/text.h"
 #include "src/scene_file/scene_tree.h"
 
 namespace limn {
 
 namespace {
+
+std::optional<double> parse_hexadecimal(std::string_view digits) {
+  int number = 0;
+  const char* const end = digits.data() + digits.size();
+  const auto [stop, error] = std::from_chars(digits.data(), end, number, 16);
+  return error == std::errc() && stop == end && number >= 0 ? std::optional(1.0 * number)
+                                                            : std::nullopt;
+}
 
 bool is_lower(char c) { return c >= 'a' && c <= 'z'; }
 bool is_upper(char c) { return c >= 'A' && c <= 'Z'; }
@@ -75,7 +89,8 @@ struct Replacement {
 const std::vector<Replacement>& replacements() {
   static const std::vector<Replacement> all = {
       {"integrator",
-       {"bdpt", "erpt", "mlt", "photonmapper", "pssmlt", "sppm"},
+       {"bdpt", "erpt", "guided_path", "guidedpath", "mlt", "photonmapper", "ppm", "pssmlt",
+        "recursive_path", "sppm", "vcm", "vpl"},
        "path",
        {"maxDepth", "rrDepth"}},
       {"film",
@@ -112,8 +127,10 @@ void replace_type(XmlElement& element, std::vector<std::string>& warnings) {
 void drop_parameters(XmlElement& element, std::vector<std::string>& warnings) {
   static const std::vector<std::string> kDropped = {"attachLog", "highQualityEdges",
                                                     "strictNormals"};
+  const bool is_sampler = element.name == "sampler";
   std::erase_if(element.children, [&](const XmlElement& child) {
     const XmlAttribute* name = child.find("name");
+    if (is_sampler && has_value(child, "name", "dimension")) return true;
     if (child.name != "boolean" || !name || !is_among(kDropped, name->value)) return false;
     if (has_value(child, "value", "true")) {
       warnings.push_back(format_warning(child.where, name->value + " is ignored"));
@@ -122,11 +139,50 @@ void drop_parameters(XmlElement& element, std::vector<std::string>& warnings) {
   });
 }
 
+// A <spectrum> of three numbers and an <srgb> become an <rgb>, also where they are "#rrggbb".
+void upgrade_colour(XmlElement& element) {
+  XmlAttribute* const value = attribute(element, "value");
+  if (!value) return;
+  const bool is_srgb = element.name == "srgb";
+  const bool is_list = element.name == "spectrum" && value->value.find(':') == std::string::npos &&
+                       split(value->value, ", \t\n\r").size() == 3;
+  if (!is_srgb && !is_list && element.name != "rgb") return;
+  std::array<std::optional<double>, 3> channels;
+  if (value->value.starts_with('#') && value->value.size() == 7) {
+    for (size_t i = 0; i < 3; ++i) {
+      channels[i] = parse_hexadecimal(std::string_view(value->value).substr(1 + 2 * i, 2));
+      if (channels[i]) *channels[i] /= 255;
+    }
+  } else if (is_srgb) {
+    const std::vector<std::string_view> parts = split(value->value, ", \t\n\r");
+    for (size_t i = 0; i < 3 && parts.size() == 3; ++i) channels[i] = parse_double(parts[i]);
+  }
+  element.name = "rgb";
+  if (!channels[0] || !channels[1] || !channels[2]) return;  // as it is, or an error of <rgb>
+  value->value.clear();
+  for (const std::optional<double>& c : channels) {
+    value->value += fmt::format("{} ", is_srgb ? srgb_decode(*c) : *c);
+  }
+}
+
+// Bitmaps that were filtered over pixels are looked up bilinearly: samples filter.
+void upgrade_filter(XmlElement& element, std::vector<std::string>& warnings) {
+  if (!has_value(element, "name", "filter_type")) return;
+  for (const char* const type : {"trilinear", "ewa"}) {
+    if (!has_value(element, "value", type)) continue;
+    attribute(element, "value")->value = "bilinear";
+    warnings.push_back(
+        format_warning(element.where, std::string("filterType ") + type + " is read as bilinear"));
+  }
+}
+
 void upgrade_element(XmlElement& element, std::vector<std::string>& warnings) {
   if (element.name == "lookAt") element.name = "lookat";
   if (element.name != "default") {
     if (XmlAttribute* name = attribute(element, "name")) name->value = snake_case(name->value);
   }
+  upgrade_colour(element);
+  upgrade_filter(element, warnings);
   replace_type(element, warnings);
   drop_parameters(element, warnings);
   const bool is_diffuse = element.name == "bsdf" && has_value(element, "type", "diffuse");

@@ -124,7 +124,7 @@ void read_film(const ObjectDescription& object, const SceneDescription& descript
   }
   sensor.camera.width /= sensors;
   read_crop(p, sensor.camera, film);
-  film.sample_border = p.boolean("sample_border", false);
+  film.sample_border = p.boolean("sample_border", p.boolean("high_quality_edges", false));
   const std::string file = choice(p, "file_format", "openexr", {"exr", "openexr", "pfm", "rgbe"});
   if (file == "pfm" || file == "rgbe") {
     warnings.push_back(

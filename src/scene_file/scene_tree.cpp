@@ -119,7 +119,7 @@ class TreeLoader {
     for (XmlElement& child : children) {
       if (child.name == "default" || child.name == "path" || child.name == "include") {
         const bool is_obeyed = errors_.keep([&] {
-          if (!is_root) {
+          if (!is_root && child.name != "default") {
             throw InputError(child.where, "<" + child.name + "> belongs directly under <scene>");
           }
           expand(child, include_depth, false);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <map>
 #include <optional>
 #include <stdexcept>
 
@@ -555,6 +556,41 @@ class SceneBuilder {
   const ObjectDescription* environment_ = nullptr;
 };
 
+// A warning's text without what tells two of a kind apart: its place, numbers and names.
+std::string kind_of(const std::string& text) {
+  std::string kind;
+  bool in_name = false;
+  for (const char c : text) {
+    if (c == '"') in_name = !in_name;
+    const bool is_number = (c >= '0' && c <= '9') || c == '.';
+    if (!in_name && !is_number) kind += c;
+  }
+  return kind;
+}
+
+// From the third of a kind on, warnings become one that lists their places.
+void shorten(std::vector<std::string>& warnings) {
+  static const std::string kMark = ": warning: ";
+  std::map<std::string, std::vector<size_t>> kinds;  // indices of warnings
+  for (size_t i = 0; i < warnings.size(); ++i) {
+    const size_t mark = warnings[i].find(kMark);
+    if (mark != std::string::npos) kinds[kind_of(warnings[i].substr(mark))].push_back(i);
+  }
+  for (const auto& [kind, members] : kinds) {
+    if (members.size() < 4) continue;
+    const auto place = [&](size_t k) {  // without its folder
+      const std::string where = warnings[members[k]].substr(0, warnings[members[k]].find(kMark));
+      return where.substr(where.rfind('/') + 1);
+    };
+    std::string list = warnings[members[2]].substr(0, warnings[members[2]].find(kMark)) + kMark +
+                       fmt::format("like that of {}, {} more: ", place(1), members.size() - 2);
+    for (size_t k = 2; k < members.size(); ++k) list += (k > 2 ? ", " : "") + place(k);
+    for (size_t k = 3; k < members.size(); ++k) warnings[members[k]].clear();
+    warnings[members[2]] = list;
+  }
+  std::erase(warnings, std::string());
+}
+
 // text: see load_scene_tree(). All errors that are independent are thrown as one.
 Scene read(const std::string& file, const SceneInput& input, const std::string* text,
            std::vector<std::string>* warnings, double smooth_as) {
@@ -565,6 +601,7 @@ Scene read(const std::string& file, const SceneInput& input, const std::string* 
     scene = SceneBuilder(description, errors, warnings, smooth_as).build();
   });
   errors.throw_any();
+  if (warnings) shorten(*warnings);
   return std::move(*scene);
 }
 

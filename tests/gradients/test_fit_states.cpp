@@ -151,7 +151,7 @@ RunSettings quick() {
   return settings;
 }
 
-std::vector<Vec3f> body_of(const Fit& fit, size_t view = 0) {
+SharedVector<Vec3f> body_of(const Fit& fit, size_t view = 0) {
   for (const Shape& shape : fit.views()[view].scene.shapes) {
     if (shape.id == "body") return shape.mesh.positions;
   }
@@ -250,7 +250,7 @@ TEST(Fit, QuasiNewtonDisplacesVertices) {
   const std::vector<Vec3d> along =
       find_parameter_or_array(view.scene, "body.displacement").directions(view.scene);
   Fit fit({view}, options, quick());
-  const std::vector<Vec3f> start = body_of(fit);
+  const SharedVector<Vec3f> start = body_of(fit);
   std::optional<Fit> other;
   double last = INFINITY, moved = 0;
   for (int i = 0; i < 5; ++i) {
@@ -263,7 +263,7 @@ TEST(Fit, QuasiNewtonDisplacesVertices) {
     EXPECT_LT(record->loss, last) << i;
     last = record->loss;
   }
-  const std::vector<Vec3f> now = body_of(fit);
+  const SharedVector<Vec3f> now = body_of(fit);
   for (size_t v = 0; v < now.size(); ++v) {
     const Vec3d d = cast<double>(now[v]) - cast<double>(start[v]);
     // Coordinates below 4, each rounded to a float.
@@ -344,7 +344,7 @@ TEST(Fit, SumsOfStepsAreThePose) {
     Scene once = deep_copy(scene);
     for (const size_t i : {1, 2, 0}) find_parameter(scene, names[i]).move(once, sums[i].value);
     const Fit expected({{once, view.target, {}}}, options, quick());
-    const std::vector<Vec3f> a = body_of(expected), b = body_of(fit);
+    const SharedVector<Vec3f> a = body_of(expected), b = body_of(fit);
     for (size_t v = 0; v < a.size(); ++v) {
       // Coordinates below 8, rounded to floats three times a step.
       EXPECT_LT(length(cast<double>(a[v]) - cast<double>(b[v])), 0x1p-17) << v;
@@ -361,7 +361,7 @@ TEST(Fit, StatesOfOtherMeshesAreRefused) {
     FitOptions options = exact_options({name});
     options.step = 1;
     Fit fit({view}, options, quick());
-    const std::vector<Vec3f> before = body_of(fit);
+    const SharedVector<Vec3f> before = body_of(fit);
     FitState state = fit.state();
     ASSERT_EQ(state.views[0].shapes.size(), 1u);
     state.views[0].shapes[0].faces.pop_back();
@@ -384,7 +384,7 @@ TEST(Fit, QuasiNewtonGoesBack) {
   const FitView view{shadow_scene(files, 0.05), target, {}};
   Fit fit({view}, options, quick()), other({view}, options, quick());
   ASSERT_TRUE(fit.step() && other.step());
-  const std::vector<Vec3f> before = body_of(fit);
+  const SharedVector<Vec3f> before = body_of(fit);
   // The next place is known: the first evaluation is of the search.
   std::atomic<bool> interrupted = false;
   int calls = 0;
@@ -409,7 +409,7 @@ TEST(Fit, QuasiNewtonGoesBack) {
   FitOptions bent = exact_options({"body.translate.x", "lamp.vertex_positions"});
   Fit failing({{shadow_scene(files, 0.05, 0.2, true), target, {}}}, bent, quick());
   const auto lamp = [&] { return failing.views()[0].scene.shapes.back().mesh.positions; };
-  const std::vector<Vec3f> flat = lamp();
+  const SharedVector<Vec3f> flat = lamp();
   EXPECT_THROW(failing.step(), InputError);
   EXPECT_EQ(failing.steps(), 0);
   EXPECT_TRUE(lamp() == flat);

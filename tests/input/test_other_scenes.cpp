@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "limn/core/image.h"
 #include "limn/core/parameter.h"
 #include "limn/core/scene.h"
 #include "support/temp_files.h"
@@ -236,6 +237,71 @@ TEST(OtherScenes, TypesThatAreGone) {
       "name=\"reparam_rays\" value=\"8\"/></integrator><sensor type=\"perspective\"/></scene>",
       "", {}, &warnings);
   EXPECT_EQ(later.max_depth, 6);
+}
+
+TEST(OtherScenes, ColoursAndFiltersOfEarlierFormats) {
+  const TempFiles files;
+  write_png(files.path("t.png"), Image(2, 2, 3), 1);
+  const auto describe = [&](const std::string& version, const std::string& bsdf,
+                            std::vector<std::string>* warnings = nullptr) {
+    const Scene scene = read_scene_text(
+        "<scene version=\"" + version + "\"><sensor type=\"perspective\"><sampler " +
+            "type=\"independent\"><integer name=\"dimension\" value=\"2\"/></sampler></sensor>" +
+            "<shape type=\"cube\"><default name=\"white\" value=\"0.5\"/>" + bsdf +
+            "</shape></scene>",
+        files.path(""), {}, warnings);
+    return scene.shapes[0].bsdf->describe();
+  };
+  const auto diffuse = [&](const std::string& value) {
+    return describe("0.6.0", "<bsdf type=\"diffuse\">" + value + "</bsdf>");
+  };
+  const std::string three = "diffuse, reflectance 0.1 0.2 0.3";
+  EXPECT_EQ(diffuse("<spectrum name=\"reflectance\" value=\"0.1, 0.2, 0.3\"/>"), three);
+  EXPECT_EQ(diffuse("<rgb name=\"reflectance\" value=\"#ff3300\"/>"),
+            "diffuse, reflectance 1 0.2 0");
+  EXPECT_EQ(diffuse("<srgb name=\"reflectance\" value=\"1 0.5 0\"/>"),
+            "diffuse, reflectance 1 0.214041 0");
+  EXPECT_EQ(diffuse("<srgb name=\"reflectance\" value=\"#ffff00\"/>"),
+            "diffuse, reflectance 1 1 0");
+  EXPECT_EQ(diffuse("<rgb name=\"reflectance\" value=\"$white\"/>"),
+            "diffuse, reflectance 0.5 0.5 0.5");
+  EXPECT_THROW(diffuse("<rgb name=\"reflectance\" value=\"#ff330\"/>"), InputError);
+  EXPECT_THROW(diffuse("<rgb name=\"reflectance\" value=\"#ff33-1\"/>"), InputError);
+  EXPECT_EQ(describe("0.5.0",
+                     "<bsdf type=\"conductor\"><rgb name=\"eta\" value=\"3\"/><rgb "
+                     "name=\"k\" value=\"1.5\"/><float name=\"extEta\" value=\"1.5\"/>"
+                     "</bsdf>"),
+            "conductor, eta 2 2 2, k 1 1 1, specular_reflectance 1 1 1");
+  std::vector<std::string> warnings;
+  const std::string bitmap =
+      describe("0.6.0",
+               "<bsdf type=\"diffuse\"><texture type=\"bitmap\" name=\"reflectance\"><string "
+               "name=\"filename\" value=\"t.png\"/><string name=\"filterType\" value=\"ewa\"/>"
+               "</texture></bsdf>",
+               &warnings);
+  EXPECT_NE(bitmap.find("bitmap"), std::string::npos);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].find("filterType ewa is read as bilinear"), std::string::npos);
+}
+
+TEST(OtherScenes, WarningsOfAKindAreListed) {
+  const TempFiles files;
+  std::string shapes;
+  for (int i = 0; i < 6; ++i) {
+    const std::string name = std::to_string(i) + ".obj";
+    const std::string degenerate = i % 5 > 0 ? "f 1 1 2\n" : "";
+    files.write(name, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n" + degenerate);
+    shapes += "<shape type=\"obj\"><string name=\"filename\" value=\"" + name + "\"/></shape>";
+  }
+  std::vector<std::string> warnings;
+  read_scene_text(scene_text(shapes), files.path(""), {}, &warnings);
+  ASSERT_EQ(warnings.size(), 3u + 1);  // and one of faces that coincide
+  const std::string left_out = " of 2 faces have two corners at the same position";
+  EXPECT_NE(warnings[0].find("1.obj: warning: 1" + left_out), std::string::npos);
+  EXPECT_NE(warnings[1].find("2.obj: warning: 1" + left_out), std::string::npos);
+  EXPECT_NE(warnings[2].find("3.obj: warning: like that of 2.obj, 2 more: 3.obj, 4.obj"),
+            std::string::npos)
+      << warnings[2];
 }
 
 TEST(OtherScenes, InstancesAreCopies) {

@@ -119,7 +119,7 @@ TEST(Serialized, SaysWhatIsWrong) {
       message_of(
           triangle(4, 1) + bytes(uint64_t{0}) + bytes(uint64_t{1} << 63) + bytes(uint32_t{2}), 1),
       ": error: the file ends before byte 9223372036854775810");
-  EXPECT_EQ(wrong(0, 3, 1, ""), ": error: positions are neither single nor double");
+  EXPECT_EQ(wrong(0x3000, 3, 1, ""), ": error: positions are said to be both single and double");
   const std::string early = ": error: the compressed data of a mesh end early or are damaged";
   EXPECT_EQ(wrong(0x1000, 3, 1, bytes(kCorners)), early);
   EXPECT_EQ(message_of(header(4) + "no zlib stream"), early);

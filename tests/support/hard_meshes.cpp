@@ -16,7 +16,7 @@ Mesh needle_mesh() {
 
 Mesh doubled_mesh() {
   Mesh mesh = icosphere_mesh(1);
-  const std::vector<FaceIndices> faces = mesh.faces;
+  const std::vector<FaceIndices> faces(mesh.faces);
   for (size_t f = 0; f < faces.size(); f += 3) mesh.faces.push_back(faces[f]);
   for (size_t f = 0; f < faces.size(); f += 5)
     mesh.faces.push_back({faces[f][0], faces[f][2], faces[f][1]});

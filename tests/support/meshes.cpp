@@ -19,7 +19,7 @@ void weld(Mesh& mesh) {
 
 }  // namespace
 
-Mesh make_mesh(std::vector<Vec3f> positions, std::vector<FaceIndices> faces) {
+Mesh make_mesh(SharedVector<Vec3f> positions, SharedVector<FaceIndices> faces) {
   Mesh mesh;
   mesh.positions = std::move(positions);
   mesh.faces = std::move(faces);
@@ -141,8 +141,8 @@ Mesh reversed(Mesh mesh) {
 }
 
 Mesh joined(const Mesh& a, const Mesh& b) {
-  std::vector<Vec3f> x = a.positions;
-  std::vector<FaceIndices> faces = a.faces;
+  std::vector<Vec3f> x(a.positions);
+  std::vector<FaceIndices> faces(a.faces);
   const auto offset = static_cast<uint32_t>(x.size());
   x.insert(x.end(), b.positions.begin(), b.positions.end());
   for (const auto& [i, j, k] : b.faces) faces.push_back({i + offset, j + offset, k + offset});

@@ -13,7 +13,7 @@ struct NamedMesh {
 };
 
 // Fills weld.
-Mesh make_mesh(std::vector<Vec3f> positions, std::vector<FaceIndices> faces);
+Mesh make_mesh(SharedVector<Vec3f> positions, SharedVector<FaceIndices> faces);
 
 Mesh tetrahedron_mesh();                // 4 faces
 Mesh cube_mesh();                       // [-1, 1]^3, 12 faces, each side cut along a diagonal

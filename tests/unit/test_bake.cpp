@@ -87,7 +87,7 @@ TEST(Bake, EqualsLinesUnderAnyMap) {
 }
 
 // Lambert's formula: the integral of w.y over a polygon seen from the origin, over pi.
-double form_factor(const std::vector<Vec3f>& corners) {
+double form_factor(const SharedVector<Vec3f>& corners) {
   double sum = 0;
   for (size_t i = 0; i < corners.size(); ++i) {
     const Vec3d a = normalize(cast<double>(corners[i]));

@@ -554,6 +554,45 @@ TEST(NormalMap, OfAConstantIsThatOfATexture) {
   }
 }
 
+// Around a BSDF of two sides the map bends the normal of the front; the back has the opposite one.
+TEST(MappedNormals, AroundTwoSidesTurnOver) {
+  const Rgb<double> tangent{0.9, -1.3, 0.4}, outward{0.1, 0.2, 0.7};
+  const auto make = [&](const std::string& type, bool two_sided) {
+    std::shared_ptr<Bsdf> inside = make_diffuse(Rgb<double>{0.2, 0.5, 0.9});
+    if (two_sided) {
+      TestProperties sides("bsdf", "twosided", {}, {inside});
+      inside = make_bsdf(sides);
+    }
+    TestProperties properties("bsdf", type, {}, {inside});
+    TestProperties texture("texture", "checkerboard");
+    properties.textures["normalmap"] = make_texture(texture);
+    return make_bsdf(properties);
+  };
+  const std::vector<Rgb<double>> normal_map{{0.6, 0.45, 0.95}, tangent, outward};
+  const std::vector<Rgb<double>> bump_map{{0.3, -0.2, 0.1}, outward};
+  for (const bool bumps : {false, true}) {
+    const std::string type = bumps ? "bumpmap" : "normalmap";
+    const auto one = make(type, false), two = make(type, true);
+    EXPECT_EQ(one->side(false), nullptr);
+    ASSERT_NE(two->side(false), nullptr);
+    EXPECT_EQ(two->parameters().size(), one->parameters().size());
+    const Rgb<double>* at = (bumps ? bump_map : normal_map).data();
+    Rng rng(1, 2, 3);
+    int seen = 0;
+    for (int i = 0; i < 200; ++i) {
+      const Vec3d n = random_direction(rng), wi = random_direction(rng), wo = random_direction(rng);
+      if (!(dot(n, Vec3d{outward.r, outward.g, outward.b}) > 0)) continue;
+      const double expected = one->eval(n, wi, wo, at).g;
+      EXPECT_EQ(two->eval(n, wi, wo, at).g, expected);
+      EXPECT_NEAR(two->side(false)->eval(-n, -wi, -wo, at).g, expected, 1e-14);
+      EXPECT_EQ(two->side(false)->pdf_solid_angle(-n, -wi, -wo, at),
+                one->pdf_solid_angle(n, wi, wo, at));
+      seen += expected > 0;
+    }
+    EXPECT_GT(seen, 10);
+  }
+}
+
 void expect_error(const std::string& part, const std::string& type,
                   std::map<std::string, TestProperties::Value> values) {
   try {

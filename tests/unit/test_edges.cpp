@@ -194,7 +194,7 @@ TEST(Edges, FacesWithoutAreaLetTheirNeighboursMeet) {
 TEST(Edges, FacesWithCoincidentCornersVanish) {
   Mesh mesh = cube_mesh();
   mesh.positions.push_back(mesh.positions[4]);  // vertex 8: a copy of vertex 4
-  std::vector<FaceIndices> faces = mesh.faces;
+  std::vector<FaceIndices> faces(mesh.faces);
   faces.push_back({4, 5, 8});
   const EdgeMesh edges = build_edge_mesh(make_mesh(mesh.positions, faces), true);
   EXPECT_EQ(edges_in_space(edges), edges_in_space(build_edge_mesh(cube_mesh(), true)));

@@ -179,7 +179,7 @@ TEST(LineLight, ClosedFormsOfOpenSky) {
 
   // A box without a lid: the floor inside sees the sky through it alone.
   Mesh walls = cube_mesh();
-  std::vector<FaceIndices> faces = walls.faces;
+  std::vector<FaceIndices> faces(walls.faces);
   std::erase_if(faces, [&](const FaceIndices& face) {
     double lowest = 1, highest = -1;
     for (const uint32_t v : face) {

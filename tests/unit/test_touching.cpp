@@ -282,7 +282,7 @@ TEST(Touching, SmallFacesAreNotWeldedAway) {
   // A grid whose cells are a few roundings wide.
   Vec3d identity[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   Mesh mesh = transformed(grid_mesh(4), identity, 0x1.0p-21, {1, 0, 0});
-  const std::vector<uint32_t> before = mesh.weld;
+  const std::vector<uint32_t> before(mesh.weld);
   weld_seams(mesh);
   EXPECT_EQ(mesh.weld, before);
 }

@@ -2,6 +2,7 @@
 // A vector whose copies share its memory until one of them is changed: copies of a scene differ in
 // few arrays of few meshes.
 #include <algorithm>
+#include <atomic>
 #include <cstddef>
 #include <initializer_list>
 #include <memory>
@@ -34,7 +35,7 @@ class SharedVector {
   }
 
   operator std::span<const T>() const { return {data_, size_}; }
-  operator std::vector<T>() const { return {begin(), end()}; }
+  explicit operator std::vector<T>() const { return {begin(), end()}; }
   bool empty() const { return size_ == 0; }
   size_t size() const { return size_; }
   const T* data() const { return data_; }
@@ -64,6 +65,8 @@ class SharedVector {
   std::vector<T>& own() {
     if (!items_) items_ = std::make_shared<std::vector<T>>();
     if (items_.use_count() > 1) items_ = std::make_shared<std::vector<T>>(*items_);
+    // Another thread that let go of a copy has read it by now: use_count() itself orders nothing.
+    std::atomic_thread_fence(std::memory_order_acquire);
     keep();
     return *items_;
   }

@@ -13,7 +13,8 @@ class Tangents {
  public:
   bool empty() const { return size_ == 0; }
   size_t size() const { return size_; }
-  Vec3<Lanes> operator[](size_t i) const {
+  // Constant, so that a write to a copy does not compile: set() writes.
+  const Vec3<Lanes> operator[](size_t i) const {
     const double* from = address(i);
     Vec3<Lanes> v;
     if (lanes_ == 1) {  // the common case, without a loop
