@@ -254,28 +254,10 @@ void read_lens(Properties& p, Camera& camera) {
   camera.focus_distance = positive(p, "focus_distance", camera.far_clip);
 }
 
-}  // namespace
-
-Sensor read_sensor(const ObjectDescription& sensor, const SceneDescription& description,
-                   Exposure& exposure, std::vector<std::string>& warnings,
-                   const SharedParts& shared) {
-  Sensor read;
-  read.id = sensor.id;
-  const bool orthographic = sensor.type == "orthographic";
-  const bool lens = sensor.type == "thinlens";
-  if (!orthographic && !lens && sensor.type != "perspective") {
-    fail_unknown_type(sensor, {"batch", "orthographic", "perspective", "thinlens"});
-  }
-  DescribedProperties p(sensor, description, kNoMakers);
-  Camera& camera = read.camera;
-  if (const ObjectDescription* film = p.nested("film")) {
-    read_film(*film, description, 1, read, warnings);
-  } else if (shared.film) {
-    read_film(*shared.film, description, shared.sensors, read, warnings);
-  }
-  const ObjectDescription* sampler = p.nested("sampler");
-  if (!sampler) sampler = shared.sampler;
-  if (sampler) read_sampler(*sampler, description, read, warnings);
+// The rest of a sensor, behind its film.
+void read_view(DescribedProperties& p, const std::string& type, Exposure& exposure,
+               Camera& camera) {
+  const bool orthographic = type == "orthographic", lens = type == "thinlens";
   Course& course = exposure.cameras.emplace_back();
   exposure.shutters.push_back(read_shutter(p));
   Matrix4 to_world = read_course(p, exposure.reference, course);
@@ -303,7 +285,38 @@ Sensor read_sensor(const ObjectDescription& sensor, const SceneDescription& desc
   if (lens) read_lens(p, camera);
   // Accepted and ignored: only a lens has a focus.
   p.number("focus_distance", camera.far_clip);
-  p.check_all_used();
+}
+
+}  // namespace
+
+Sensor read_sensor(const ObjectDescription& sensor, const SceneDescription& description,
+                   Exposure& exposure, std::vector<std::string>& warnings,
+                   const SharedParts& shared) {
+  Sensor read;
+  read.id = sensor.id;
+  if (sensor.type != "orthographic" && sensor.type != "thinlens" && sensor.type != "perspective") {
+    fail_unknown_type(sensor, {"batch", "orthographic", "perspective", "thinlens"});
+  }
+  DescribedProperties p(sensor, description, kNoMakers);
+  ErrorList errors;
+  bool is_sound = errors.keep([&] {
+    if (const ObjectDescription* film = p.nested("film")) {
+      read_film(*film, description, 1, read, warnings);
+    } else if (shared.film) {
+      read_film(*shared.film, description, shared.sensors, read, warnings);
+    }
+  });
+  is_sound &= errors.keep([&] {
+    const ObjectDescription* sampler = p.nested("sampler");
+    if (!sampler) sampler = shared.sampler;
+    if (sampler) read_sampler(*sampler, description, read, warnings);
+  });
+  is_sound &= errors.keep([&] {
+    read_view(p, sensor.type, exposure, read.camera);
+    p.check_all_used();
+  });
+  errors.throw_any();
+  if (!is_sound) throw InputErrors();
   return read;
 }
 

@@ -154,6 +154,24 @@ TEST(BadScene, IndependentMistakesAreReportedTogether) {
             "13 errors");
 }
 
+TEST(BadScene, MistakesOfSensorFilmAndSamplerAreReportedTogether) {
+  const TempFiles files;
+  std::string message =
+      message_of(files,
+                 scene("<sensor type=\"perspective\"><float name=\"fovv\" value=\"30\"/>\n"
+                       "<film type=\"hdrfilm\"><integer name=\"widht\" value=\"3\"/></film>\n"
+                       "<sampler type=\"halton\"/></sensor>"),
+                 {});
+  for (size_t at; (at = message.find(" (")) != message.npos;) {
+    message.erase(at, message.find(')', at) + 1 - at);
+  }
+  EXPECT_EQ(message,
+            "@/s.xml:4:22: error: film \"hdrfilm\": unknown parameter \"widht\"\n"
+            "@/s.xml:5:1: error: unknown sampler type \"halton\"\n"
+            "@/s.xml:3:28: error: sensor \"perspective\": unknown parameter \"fovv\"\n"
+            "3 errors");
+}
+
 // Whatever refers to an object that failed, directly or by others, has no error of its own.
 TEST(BadScene, WhatFollowsFromAMistakeIsNotReported) {
   const TempFiles files;
