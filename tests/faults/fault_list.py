@@ -60,7 +60,7 @@ FAULTS = [
           "return {density, 1 /", "return {1.1 * density, 1 /", "test_shadow_pieces", "GlossLines.*"),
     Fault("boundary", "share of lines lost at vertices", TERMS + "shading_boundary.cpp",
           "draw.share = 1 - share_of_lines(vertex, sample);", "", "test_shadow_pieces",
-          "ShadowPieces.HaveTrue*"),
+          "GlossLines.Share*"),
     Fault("boundary", "density x 1.1", TERMS + "vertex_edges.cpp",
           "(view.distance * view.distance * view.distance *",
           "(1.1 * view.distance * view.distance * view.distance *", POWER, "*/boundary"),

@@ -33,20 +33,24 @@ const Case kCases[] = {
         <bsdf type="diffuse"/><bsdf type="conductor"/></bsdf>)",
      {"paint.weight"}}};
 
+Scene scene_with(const TempFiles& files, const std::string& bsdf) {
+  SceneParts parts;
+  parts.max_depth = 6;
+  parts.rr_depth = 3;
+  parts.width = parts.height = 8;
+  parts.body = square("floor", 3, -90, {0, 0, 0}, diffuse("ground", "0.5, 0.5, 0.5")) +
+               square("object", 1.5, -40, {0, 1, 0}, bsdf) +
+               square("lamp", 1, 90, {0, 3, 1}, area_light("glow", "5, 5, 5")) +
+               constant_light("sky", "0.5, 0.4, 0.3");
+  return make_scene(files, parts);
+}
+
 TEST(CheckPaths, AgreesForEveryKind) {
   const TempFiles files;
   RunSettings settings;
   settings.spp = 16;
   for (const Case& c : kCases) {
-    SceneParts parts;
-    parts.max_depth = 6;
-    parts.rr_depth = 3;
-    parts.width = parts.height = 8;
-    parts.body = square("floor", 3, -90, {0, 0, 0}, diffuse("ground", "0.5, 0.5, 0.5")) +
-                 square("object", 1.5, -40, {0, 1, 0}, c.bsdf) +
-                 square("lamp", 1, 90, {0, 3, 1}, area_light("glow", "5, 5, 5")) +
-                 constant_light("sky", "0.5, 0.4, 0.3");
-    const Scene scene = make_scene(files, parts);
+    const Scene scene = scene_with(files, c.bsdf);
     for (const char* parameter : c.parameters) {
       const PathsCheck check = check_paths(scene, parameter, 0, settings);
       EXPECT_NE(check.gradient_sum, 0) << parameter;
@@ -54,6 +58,17 @@ TEST(CheckPaths, AgreesForEveryKind) {
     }
     EXPECT_THROW(check_paths(scene, "object.translate.x", 0, settings), InputError);
   }
+}
+
+// One step of three agrees with the slopes of smoothed tables.
+TEST(CheckPaths, NeedsTwoSteps) {
+  const TempFiles files;
+  RunSettings settings;
+  settings.spp = 16;
+  const Scene scene = scene_with(files, R"(<bsdf type="roughplastic" id="paint">
+                                             <float name="alpha" value="0.16"/></bsdf>)");
+  EXPECT_TRUE(check_paths(scene, "paint.alpha", 0.0016, settings).agrees());
+  EXPECT_FALSE(check_paths(scene, "paint.alpha", 0, settings).agrees());
 }
 
 }  // namespace

@@ -237,8 +237,9 @@ TEST(ShadowPieces, AreDrawnByTheirDensity) {
 }
 
 // A box on a floor or above it, before a bulb.
-Scene standing_box(const TempFiles& files, const std::string& surface, double height,
-                   double gap = 0) {
+SceneParts box_parts(const std::string& surface, double height, double gap = 0,
+                     const std::string& floor = square("floor", 3, -90, {0, 0, 0},
+                                                       diffuse("grey", ".7, .7, .7"))) {
   SceneParts parts;
   parts.max_depth = 3;
   parts.origin = {0.35, 2, 3.5};
@@ -246,17 +247,20 @@ Scene standing_box(const TempFiles& files, const std::string& surface, double he
   parts.fov = 62;
   parts.width = parts.height = 12;
   parts.body =
-      square("floor", 3, -90, {0, 0, 0}, diffuse("grey", ".7, .7, .7")) +
-      R"(<shape type="cube" id="box"><transform name="to_world">
+      floor + R"(<shape type="cube" id="box"><transform name="to_world">
                     <scale x=".6" y=")" +
       fmt::format(R"({}" z=".42"/><translate y="{}"/></transform>)", height / 2, height / 2 + gap) +
       surface + R"(</shape>
                <emitter type="point"><point name="position" value="0.714, 3.036, 0.109"/>
                  <rgb name="intensity" value="16, 16, 16"/></emitter>)";
-  return make_scene(files, parts);
+  return parts;
 }
 
 struct StandingBox {
+  Scene scene(const TempFiles& files) const {
+    return make_scene(files, box_parts(surface, height, gap));
+  }
+
   const char* name;
   std::string surface;
   double height;
@@ -308,7 +312,7 @@ class Runs {
 TEST(ShadowPieces, HaveTrueErrorBarsWhereShadowsBegin) {
   const TempFiles files;
   for (const StandingBox& box : {matt_box(), glossy_box(), plate(), hovering_box()}) {
-    const Scene scene = standing_box(files, box.surface, box.height, box.gap);
+    const Scene scene = box.scene(files);
     GradientOptions options;
     options.parameters = {"box.translate.z"};
     RunSettings settings;
@@ -326,7 +330,7 @@ TEST(ShadowPieces, HaveTrueErrorBarsWhereShadowsBegin) {
 TEST(ShadowPieces, ServeReverseMode) {
   const TempFiles files;
   const StandingBox box = matt_box();
-  const Scene scene = standing_box(files, box.surface, box.height);
+  const Scene scene = box.scene(files);
   BackwardOptions options;
   options.parameters = {"box.translate.z"};
   RunSettings settings;
@@ -341,11 +345,45 @@ TEST(ShadowPieces, ServeReverseMode) {
   runs.expect_true("reverse");
 }
 
+// Where lines carry most of the light: on a strip of floor, a hundredth of the film, just before
+// the lit side of a hovering box. Methods without lines leave its edges to vertices.
+TEST(GlossLines, ShareEdgesWithVertices) {
+  const TempFiles files;
+  const char* strip = "v .601 0 .4\nv .63 0 .4\nv .63 0 -.4\nv .601 0 -.4\nf 1 2 3 4\n";
+  SceneParts parts = box_parts(kGloss, 0.2, 0.1,
+                               obj_shape("strip", files.write("strip.obj", strip), true, 1,
+                                         {0, 0, 0}, diffuse("grey", ".7, .7, .7")));
+  parts.origin = {0.59, 3, 0};
+  parts.target = {0.59, 0, 0.001};
+  parts.fov = 60;
+  parts.width = parts.height = 32;
+  const auto sum_of = [&](const std::string& method, int spp) {
+    GradientOptions options;
+    options.parameters = {"box.translate.y"};
+    options.terms = {"boundary"};
+    options.method = method;
+    RunSettings settings;
+    settings.spp = spp;
+    settings.threads = 2;
+    return gradient(make_scene(files, parts), options, settings).parameters[0].image_sum;
+  };
+  const Moments lines = sum_of("silhouettes", 256);
+  parts.film = R"(<integer name="crop_offset_x" value="14"/><integer name="crop_width" value="4"/>
+                  <integer name="crop_offset_y" value="10"/><integer name="crop_height" value="12"/>
+                  <rfilter type="box"/>)";
+  const Moments vertices = sum_of("forest", 4096);
+  const double error = std::sqrt(lines.variance(0) + vertices.variance(0));
+  fmt::print("{} +- {}, {} +- {}\n", lines.mean(0), std::sqrt(lines.variance(0)), vertices.mean(0),
+             std::sqrt(vertices.variance(0)));
+  EXPECT_LT(std::fabs(lines.mean(0) - vertices.mean(0)), 4 * error);
+  EXPECT_LT(error, 0.05 * std::fabs(vertices.mean(0)));
+}
+
 // In each ninth of the film, as many draws of lines arrive where the camera sees them as their
 // density says, which is integrated over the film and the edges.
 TEST(GlossLines, FollowTheirDensity) {
   const TempFiles files;
-  Scene scene = standing_box(files, conductor("gloss", 0.3), 0.2, 0.4);
+  Scene scene = make_scene(files, box_parts(conductor("gloss", 0.3), 0.2, 0.4));
   find_parameter(scene, "box.translate.z").seed(scene, 0);
   const TracedScene traced(scene, 1, {.edges = true});
   const PathContext& context = traced.context();

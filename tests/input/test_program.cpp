@@ -1,6 +1,7 @@
 // The program as a user meets it: exit statuses and messages.
 #include <cmath>
 
+#include "support/motion_scenes.h"
 #include "support/program.h"
 
 namespace limn {
@@ -465,6 +466,33 @@ TEST_F(Program, BadNumbers) {
             std::string::npos);
   EXPECT_EQ(refused("check " + scene_ + " --wrt screen.translate.x --spp 1"),
             "error: check needs --spp of at least 2, for standard errors\n");
+}
+
+// Before anything is rendered.
+TEST_F(Program, CoverageRefusesWhatItCannotTake) {
+  const std::string coverage = " --alpha --spp 1 -o " + out();
+  EXPECT_NE(refused("render " + scene_ + " --points faces" + coverage).find("--alpha takes a ray"),
+            std::string::npos);
+  SceneParts parts;
+  parts.body =
+      animated(square("screen", 1, 0, {0, 0, 0}, diffuse("paper", "0.8, 0.8, 0.8")), {1, 0, 0});
+  const std::string moving = files_.write("moving.xml", with_shutter(parts, 0, 1));
+  EXPECT_NE(refused("render " + moving + coverage).find("--alpha"), std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(out()));
+  const std::string target = files_.path("target.exr");
+  ASSERT_EQ(run("render " + scene_ + " --alpha --spp 1 --quiet -o " + target).status, 0);
+  EXPECT_NE(refused("backward " + scene_ + " --what alpha --loss relative-l2 --target " + target +
+                    " --wrt screen.translate.x -o " + files_.path("back"))
+                .find("relative to coverage"),
+            std::string::npos);
+}
+
+// A later one is found before the first is checked.
+TEST_F(Program, ChecksAlongPathsRefuseWhatMovesThem) {
+  const std::string text = refused(
+      "check " + scene_ + " --same-paths --spp 1 --wrt blaze.radiance.r --wrt screen.scale");
+  EXPECT_NE(text.find("\"screen.scale\" moves edges"), std::string::npos) << text;
+  EXPECT_EQ(text.find("blaze.radiance.r"), std::string::npos) << text;
 }
 
 // The options of a method that is not asked for are a mistake, whatever the command.

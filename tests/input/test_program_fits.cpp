@@ -84,6 +84,25 @@ TEST_F(Program, FitsAndGoesOn) {
   EXPECT_FALSE(std::ifstream(files_.path("other") + "/state.cbor"));
 }
 
+// It is the pictures' mask.
+TEST_F(Program, FitsOfCoverageTakeNoMask) {
+  const std::string coverage = files_.path("coverage.exr"), mask = files_.path("mask.exr");
+  ASSERT_EQ(run("render " + scene_ + " --alpha --spp 4 --quiet -o " + coverage).status, 0);
+  Image one(8, 8, 1);
+  one.data[0] = 1;
+  write_exr(mask, one, false, {});
+  const auto loss = [&](const std::string& folder, const std::string& more) {
+    const Outcome outcome =
+        run("fit " + scene_ + " --target - --alpha " + coverage + more +
+            " --wrt screen.translate.x --spp 2 --steps 1 --no-report -o " + files_.path(folder));
+    EXPECT_EQ(outcome.status, 0) << outcome.text;
+    return read_json(files_.path(folder) + "/fit.json")["history"][0]["loss"];
+  };
+  const json alone = loss("alone", "");
+  EXPECT_GT(alone, 0);
+  EXPECT_EQ(loss("masked", " --mask " + mask), alone);
+}
+
 // A break in the blurred steps changes no bits; the folder tells their sigma.
 TEST_F(Program, FitsThatBeginBlurredGoOn) {
   const std::string target = files_.path("target.exr");
