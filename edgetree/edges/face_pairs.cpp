@@ -104,7 +104,7 @@ struct LeafFans {
 class PairFinder {
  public:
   PairFinder(std::span<const Mesh* const> meshes, const Vec3d& viewer, int threads)
-      : viewer_(viewer), threads_(threads) {
+      : meshes_(meshes), viewer_(viewer), threads_(threads) {
     size_t count = 0;
     for (const Mesh* mesh : meshes) count += mesh->faces.size();
     faces_.reserve(count), boxes_.reserve(count), fans_.reserve(count);
@@ -116,7 +116,11 @@ class PairFinder {
   }
 
   std::vector<FacePair> find() const {
-    const BoxTree tree(boxes_, threads_);
+    const BoxTree tree(boxes_, threads_, [&](uint32_t i) {
+      const FaceRef face = faces_[i];
+      const Corners c = face_corners<double>(*meshes_[face.shape.index()], face.face);
+      return std::pair(c, 2 * margin_of(c));
+    });
     std::vector<LeafFans> fans(tree.leaf_count());
     for (uint32_t leaf = 0; leaf < tree.leaf_count(); ++leaf)
       for (size_t i = 0; i < tree.leaf(leaf).size(); ++i)
@@ -136,9 +140,8 @@ class PairFinder {
     for (uint32_t f = 0; f < count; ++f) {
       const Corners c = face_corners<double>(mesh, FaceId(f));
       normals[f] = cross(c[1] - c[0], c[2] - c[0]);
-      const double longest = longest_side(c), blur = blur_of(c, viewer_);
-      needles[f] = is_needle(length(normals[f]) / longest, blur);
-      add_box(c, std::max(reach_of(longest, blur), touch_tolerance(largest_coordinate(c), 0)));
+      needles[f] = is_needle(length(normals[f]) / longest_side(c), blur_of(c, viewer_));
+      add_box(c, margin_of(c));
       faces_.push_back({shape, FaceId(f)});
     }
     const std::vector<VertexId> ids = edge_vertex_ids(mesh);
@@ -152,6 +155,10 @@ class PairFinder {
     }
   }
 
+  double margin_of(const Corners& c) const {
+    return std::max(reach_of(longest_side(c), blur_of(c, viewer_)),
+                    touch_tolerance(largest_coordinate(c), 0));
+  }
   // Enlarged by twice the margin, which covers its own rounding to floats.
   void add_box(const Corners& c, double margin) {
     FloatBox& box = boxes_.emplace_back();
@@ -161,6 +168,7 @@ class PairFinder {
     }
   }
 
+  std::span<const Mesh* const> meshes_;
   Vec3d viewer_;
   int threads_;
   std::vector<FaceRef> faces_;     // of all meshes

@@ -12,6 +12,17 @@
 
 namespace limn {
 
+namespace {
+
+Bounds bounds(const FloatBox& box) {
+  Bounds bounds;
+  bounds.extend({box.lower[0], box.lower[1], box.lower[2]});
+  bounds.extend({box.upper[0], box.upper[1], box.upper[2]});
+  return bounds;
+}
+
+}  // namespace
+
 void FloatBox::extend(const FloatBox& other) {
   for (int k = 0; k < 3; ++k) {
     lower[k] = std::min(lower[k], other.lower[k]);
@@ -54,8 +65,10 @@ uint32_t LeafBoxes::overlaps(const FloatBox& box) const {
 #endif
 }
 
-BoxTree::BoxTree(std::span<const FloatBox> boxes, int threads)
-    : boxes_(boxes), leaves_(static_cast<uint32_t>((boxes.size() + kLeaf - 1) / kLeaf)) {
+BoxTree::BoxTree(std::span<const FloatBox> boxes, int threads, Inside inside)
+    : boxes_(boxes),
+      leaves_(static_cast<uint32_t>((boxes.size() + kLeaf - 1) / kLeaf)),
+      inside_(std::move(inside)) {
   if (leaves_ == 0) return;
   items_.reserve(boxes.size());
   for (uint32_t i = 0; i < boxes.size(); ++i) {
@@ -63,7 +76,8 @@ BoxTree::BoxTree(std::span<const FloatBox> boxes, int threads)
     items_.push_back({{low[0] + high[0], low[1] + high[1], low[2] + high[2]}, i});
   }
   nodes_.resize(2 * leaves_ - 1);
-  leaf_boxes_.resize(leaves_);
+  if (inside_) oriented_.resize(nodes_.size());
+  leaf_nodes_.resize(leaves_);
   packed_.resize(leaves_);
   order_.resize(boxes.size());
   const Part root{0, 0, leaves_};
@@ -113,6 +127,7 @@ void BoxTree::build(const Part& part) {
     build(part.right());
     nodes_[part.node] = nodes_[part.left().node];
     nodes_[part.node].extend(nodes_[part.right().node]);
+    orient(part);
     return;
   }
   const size_t begin = size_t{part.first} * kLeaf, end = std::min(begin + kLeaf, items_.size());
@@ -122,7 +137,32 @@ void BoxTree::build(const Part& part) {
     box.extend(boxes_[order_[i]]);
     packed_[part.first].set(static_cast<uint32_t>(i - begin), boxes_[order_[i]]);
   }
-  nodes_[part.node] = leaf_boxes_[part.first] = box;
+  nodes_[part.node] = box;
+  leaf_nodes_[part.first] = part.node;
+  orient(part);
+}
+
+void BoxTree::orient(const Part& part) {
+  if (!inside_) return;
+  if (part.count > 1 && !(oriented_[part.left().node] && oriented_[part.right().node])) return;
+  std::vector<FaceCorners> faces;
+  double margin = 0;
+  const size_t begin = size_t{part.first} * kLeaf;
+  const size_t end = std::min(begin + size_t{part.count} * kLeaf, items_.size());
+  for (size_t i = begin; i < end; ++i) {
+    const auto [corners, reach] = inside_(items_[i].box);
+    faces.push_back(corners);
+    margin = std::max(margin, reach);
+  }
+  if (const auto box = thin_box(faces, margin, bounds(nodes_[part.node])))
+    oriented_[part.node] = std::make_unique<OrientedBox>(*box);
+}
+
+bool BoxTree::are_apart(uint32_t a, uint32_t b) const {
+  const OrientedBox *own = oriented_[a].get(), *other = oriented_[b].get();
+  if (!own && !other) return false;
+  return limn::are_apart(own ? *own : oriented(bounds(nodes_[a])),
+                         other ? *other : oriented(bounds(nodes_[b])));
 }
 
 void BoxTree::join_boxes(const Part& part, uint32_t smallest) {
@@ -131,6 +171,7 @@ void BoxTree::join_boxes(const Part& part, uint32_t smallest) {
   join_boxes(part.right(), smallest);
   nodes_[part.node] = nodes_[part.left().node];
   nodes_[part.node].extend(nodes_[part.right().node]);
+  orient(part);
 }
 
 std::span<const uint32_t> BoxTree::leaf(uint32_t leaf) const {
@@ -147,7 +188,7 @@ void BoxTree::find_leaves(uint32_t first, const Meets& meets, std::vector<uint32
   stack[depth++] = {0, 0, leaves_};
   while (depth > 0) {
     const Part part = stack[--depth];
-    if (part.first + part.count <= first || !meets(nodes_[part.node])) continue;
+    if (part.first + part.count <= first || !meets(part.node)) continue;
     if (part.count == 1) {
       leaves.push_back(part.first);
       continue;
@@ -160,12 +201,22 @@ void BoxTree::find_leaves(uint32_t first, const Meets& meets, std::vector<uint32
 void BoxTree::find_leaves(const FloatBox& box, uint32_t first,
                           std::vector<uint32_t>& leaves) const {
   find_leaves(
-      first, [&](const FloatBox& node) { return node.overlaps(box); }, leaves);
+      first, [&](uint32_t node) { return nodes_[node].overlaps(box); }, leaves);
+}
+
+void BoxTree::find_near_leaves(uint32_t own, std::vector<uint32_t>& leaves) const {
+  if (!inside_) return find_leaves(leaf_box(own), own, leaves);
+  const uint32_t from = leaf_nodes_[own];
+  const auto meets = [&](uint32_t node) {
+    return nodes_[node].overlaps(nodes_[from]) && !are_apart(from, node);
+  };
+  find_leaves(own, meets, leaves);
 }
 
 void BoxTree::find_leaves(const Vec3d& from, const Vec3d& along, double s_max,
                           std::vector<uint32_t>& leaves) const {
-  const auto meets = [&](const FloatBox& node) {
+  const auto meets = [&](uint32_t at) {
+    const FloatBox& node = nodes_[at];
     double low = 0, high = s_max;
     for (int k = 0; k < 3; ++k) {
       if (along[k] == 0) {

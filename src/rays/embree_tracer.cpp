@@ -19,6 +19,7 @@
 #include "limn/core/coincident_faces.h"
 #include "limn/core/error.h"
 #include "limn/core/exposure.h"
+#include "limn/core/oriented_boxes.h"
 #include "limn/core/parallel.h"
 #include "limn/core/ray_tracer.h"
 #include "limn/core/touch.h"
@@ -130,11 +131,17 @@ bool is_rounding(const Context& context, FaceRef face, double t) {
                    face);
 }
 
+// The face that Embree names. Shapes in coordinates of their own are instances.
+FaceRef face_of(uint32_t instance, uint32_t geometry, uint32_t primitive) {
+  return {ShapeId(instance != RTC_INVALID_GEOMETRY_ID ? instance : geometry), FaceId(primitive)};
+}
+
 void reject_skipped(const RTCFilterFunctionNArguments* arguments) {
   const auto& context = *reinterpret_cast<const Context*>(arguments->context);
   // Rays are traced one at a time.
-  const FaceRef face{ShapeId(RTCHitN_geomID(arguments->hit, 1, 0)),
-                     FaceId(RTCHitN_primID(arguments->hit, 1, 0))};
+  const FaceRef face =
+      face_of(RTCHitN_instID(arguments->hit, 1, 0, 0), RTCHitN_geomID(arguments->hit, 1, 0),
+              RTCHitN_primID(arguments->hit, 1, 0));
   if (is_skipped(context, face) || is_rounding(context, face, RTCRayN_tfar(arguments->ray, 1, 0)))
     arguments->valid[0] = 0;
 }
@@ -182,6 +189,16 @@ Vec3d origin_of(const Scene& scene) {
   return origin;
 }
 
+// Coordinates for a mesh of slivers that lie askew; none for other meshes.
+std::optional<OrientedBox> frame_of(const Mesh& mesh) {
+  constexpr size_t kMost = 4096;  // faces that tell slivers; not tuned
+  std::vector<FaceCorners> faces;
+  const size_t step = mesh.faces.size() / kMost + 1;
+  for (size_t f = 0; f < mesh.faces.size(); f += step)
+    faces.push_back(face_corners<double>(mesh, FaceId(static_cast<uint32_t>(f))));
+  return box_of_slivers(faces);
+}
+
 struct Release {
   void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
   void operator()(RTCScene scene) const { rtcReleaseScene(scene); }
@@ -225,18 +242,10 @@ class EmbreeTracer final : public RayTracer {
     device_.reset(rtcNewDevice(nullptr));
     if (!device_) throw InputError("Embree cannot start on this machine");
     rtcSetDeviceErrorFunction(device_.get(), EmbreeErrors::note, &errors_);
-    rtc_scene_.reset(rtcNewScene(device_.get()));
-    errors_.check();
-    rtcSetSceneFlags(rtc_scene_.get(),
-                     static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | kFilterOfQuery));
-    // What serves one time alone must be built soon.
-    rtcSetSceneBuildQuality(rtc_scene_.get(),
-                            is_moving(scene) ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH);
+    rtc_scene_ = make_scene();
     for (size_t i = 0; i < scene.shapes.size(); ++i)
-      attach(scene.shapes[i].mesh, ShapeId(static_cast<uint32_t>(i)));
-    // On the threads of this call alone.
-    parallel_for(1, threads, [&](size_t) { rtcJoinCommitScene(rtc_scene_.get()); });
-    errors_.check();
+      attach(scene.shapes[i].mesh, ShapeId(static_cast<uint32_t>(i)), threads);
+    commit(rtc_scene_.get(), threads);
   }
 
   bool closest(const Ray& ray, Hit& hit) const override {
@@ -248,7 +257,7 @@ class EmbreeTracer final : public RayTracer {
     intersect(rtc_scene_.get(), context.base, query);
     const bool found = query.hit.geomID != RTC_INVALID_GEOMETRY_ID;
     if (found) {
-      hit.face = {ShapeId(query.hit.geomID), FaceId(query.hit.primID)};
+      hit.face = face_of(query.hit.instID[0], query.hit.geomID, query.hit.primID);
       hit.t = query.ray.tfar;
       settle(ray, hit);
     }
@@ -290,7 +299,53 @@ class EmbreeTracer final : public RayTracer {
   bool is_traced(const Mesh& mesh, FaceRef face) const {
     return has_area(mesh, mesh.face(face.face)) && copies_.first(face) == face;
   }
-  void attach(const Mesh& mesh, ShapeId id) {
+  Owned<RTCScene> make_scene() {
+    Owned<RTCScene> made(rtcNewScene(device_.get()));
+    errors_.check();
+    rtcSetSceneFlags(made.get(),
+                     static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | kFilterOfQuery));
+    // What serves one time alone must be built soon.
+    rtcSetSceneBuildQuality(made.get(),
+                            is_moving(scene_) ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH);
+    return made;
+  }
+  // On the threads of this call alone.
+  void commit(RTCScene rtc_scene, int threads) {
+    parallel_for(1, threads, [&](size_t) { rtcJoinCommitScene(rtc_scene); });
+    errors_.check();
+  }
+  // Slivers that lie askew get coordinates along their sides: a ray may meet the axis-aligned boxes
+  // of all faces of a cylinder.
+  void attach(const Mesh& mesh, ShapeId id, int threads) {
+    const auto frame = frame_of(mesh);
+    if (!frame) {
+      attach_to(rtc_scene_.get(), mesh, id, id.index(),
+                [&](const Vec3d& x) { return x - origin_; });
+      return;
+    }
+    const auto& [center, axes, half] = *frame;
+    const Owned<RTCScene> own = make_scene();
+    attach_to(own.get(), mesh, id, 0, [&](const Vec3d& x) {
+      const Vec3d arm = x - center;
+      return Vec3d{dot(axes[0], arm), dot(axes[1], arm), dot(axes[2], arm)};
+    });
+    commit(own.get(), threads);
+    const Owned<RTCGeometry> instance(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_INSTANCE));
+    errors_.check();
+    rtcSetGeometryInstancedScene(instance.get(), own.get());
+    const Vec3f columns[4] = {cast<float>(axes[0]), cast<float>(axes[1]), cast<float>(axes[2]),
+                              cast<float>(center - origin_)};
+    rtcSetGeometryTransform(instance.get(), 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, columns);
+    attach_geometry(rtc_scene_.get(), instance.get(), id.index());
+  }
+  void attach_geometry(RTCScene rtc_scene, RTCGeometry geometry, uint32_t number) {
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometryByID(rtc_scene, geometry, number);
+    errors_.check();
+  }
+  template <class Place>
+  void attach_to(RTCScene rtc_scene, const Mesh& mesh, ShapeId id, uint32_t number,
+                 const Place& place) {
     const Owned<RTCGeometry> geometry(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_TRIANGLE));
     errors_.check();
     auto* vertices = static_cast<Vec3f*>(
@@ -301,14 +356,12 @@ class EmbreeTracer final : public RayTracer {
                                 sizeof(FaceIndices), mesh.faces.size()));
     errors_.check();
     std::transform(mesh.positions.begin(), mesh.positions.end(), vertices,
-                   [&](const Vec3f& x) { return cast<float>(cast<double>(x) - origin_); });
+                   [&](const Vec3f& x) { return cast<float>(place(cast<double>(x))); });
     for (uint32_t i = 0; i < mesh.faces.size(); ++i) {
       const FaceIndices& face = mesh.faces[i];
       faces[i] = is_traced(mesh, {id, FaceId(i)}) ? face : FaceIndices{face[0], face[0], face[0]};
     }
-    rtcCommitGeometry(geometry.get());
-    rtcAttachGeometryByID(rtc_scene_.get(), geometry.get(), id.index());
-    errors_.check();
+    attach_geometry(rtc_scene, geometry.get(), number);
   }
   Context make_context(const Ray& ray) const {
     Context context;

@@ -73,9 +73,12 @@ double blur_of(const Corners& corners, const Vec3d& viewer) {
 // farther apart are no thin layer.
 constexpr double kMostNear = 0x1p-8;
 
-// A box enlarged by twice the rounding of positions, which covers its own rounding to floats.
+// Twice the rounding of positions, which covers the rounding of boxes to floats, and `reach`.
+double margin_of(double size, double reach) { return 2 * touch_tolerance(size, 0) + reach; }
+
+// A box enlarged by the margin.
 FloatBox box_around(const Vec3d& lower, const Vec3d& upper, double size, double reach) {
-  const double margin = 2 * touch_tolerance(size, 0) + reach;
+  const double margin = margin_of(size, reach);
   FloatBox box;
   for (int k = 0; k < 3; ++k) {
     box.lower[k] = static_cast<float>(lower[k] - margin);
@@ -166,7 +169,11 @@ class OverlapFinder {
   }
 
   std::vector<FoundPair> find(int threads) {
-    return BoxTree(boxes_, threads)
+    const auto inside = [&](uint32_t i) {
+      const Face& face = faces_[i];
+      return std::pair(face.corners, margin_of(face.size, std::min(face.blur, face.most)));
+    };
+    return BoxTree(boxes_, threads, inside)
         .find_pairs<FoundPair>(
             threads, [](uint32_t, uint32_t) { return 0u; },
             [&](uint32_t i, uint32_t j, std::vector<FoundPair>& pairs) {

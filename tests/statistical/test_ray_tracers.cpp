@@ -24,6 +24,13 @@ Scene some_scene(double unit) {
     scene.shapes.back().mesh = transformed(named.mesh, rows, 0.6 * unit,
                                            Vec3d{std::cos(k), std::sin(2 * k), 0.2 * k} * unit);
   }
+  // Slivers askew: in coordinates of their own.
+  Vec3d rows[3];
+  Rng rng(1, 2, 3);
+  random_rotation(rng, rows);
+  scene.shapes.emplace_back();
+  scene.shapes.back().mesh =
+      transformed(rod_mesh(64, 0.1), rows, unit, Vec3d{0.3, 0.2, 0.1} * unit);
   scene.shapes[1].is_emitter = true;
   return scene;
 }

@@ -108,6 +108,19 @@ Mesh grid_mesh(int cells) {
   return make_mesh(x, faces);
 }
 
+Mesh rod_mesh(int sides, double radius) {
+  std::vector<Vec3f> x;
+  std::vector<FaceIndices> faces;
+  for (int i = 0; i < sides; ++i) {
+    const double angle = 2 * kPi * i / sides;
+    for (const double z : {-1, 1})
+      x.push_back(cast<float>(Vec3d{radius * std::cos(angle), radius * std::sin(angle), z}));
+    const auto a = static_cast<uint32_t>(2 * i), b = static_cast<uint32_t>(2 * ((i + 1) % sides));
+    faces.insert(faces.end(), {{a, b, b + 1}, {a, b + 1, a + 1}});
+  }
+  return make_mesh(x, faces);
+}
+
 Mesh cap_mesh(int levels) {
   const Mesh sphere = icosphere_mesh(levels);
   std::vector<FaceIndices> faces;

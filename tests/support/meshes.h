@@ -15,11 +15,12 @@ struct NamedMesh {
 // Fills weld.
 Mesh make_mesh(SharedVector<Vec3f> positions, SharedVector<FaceIndices> faces);
 
-Mesh tetrahedron_mesh();                // 4 faces
-Mesh cube_mesh();                       // [-1, 1]^3, 12 faces, each side cut along a diagonal
-Mesh icosphere_mesh(int levels);        // unit sphere, 20 * 4^levels faces
-Mesh torus_mesh(int around, int tube);  // radii 1 and 0.4, 2 * around * tube faces
-Mesh grid_mesh(int cells);              // [-1, 1]^2 at z = 0, facing +z, 2 * cells^2 faces, open
+Mesh tetrahedron_mesh();                  // 4 faces
+Mesh cube_mesh();                         // [-1, 1]^3, 12 faces, each side cut along a diagonal
+Mesh icosphere_mesh(int levels);          // unit sphere, 20 * 4^levels faces
+Mesh torus_mesh(int around, int tube);    // radii 1 and 0.4, 2 * around * tube faces
+Mesh grid_mesh(int cells);                // [-1, 1]^2 at z = 0, facing +z, 2 * cells^2 faces, open
+Mesh rod_mesh(int sides, double radius);  // about z, from -1 to 1, 2 * sides slivers, open
 // Half of the icosphere: open, curved.
 Mesh cap_mesh(int levels);
 

@@ -4,9 +4,13 @@
 #include <array>
 #include <bit>
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
+#include "limn/core/oriented_boxes.h"
 #include "limn/core/parallel.h"
 #include "limn/core/vec.h"
 
@@ -40,10 +44,16 @@ class BoxTree {
  public:
   static constexpr uint32_t kLeaf = LeafBoxes::kLanes;
 
-  BoxTree(std::span<const FloatBox> boxes, int threads);
+  // The corners of a face inside of box i, and by how much the box is larger on every side.
+  // Thread-safe.
+  using Inside = std::function<std::pair<FaceCorners, double>(uint32_t i)>;
+
+  // inside: if given, find_pairs omits pairs of boxes whose faces are apart by more than these
+  // margins, where many such are found together.
+  BoxTree(std::span<const FloatBox> boxes, int threads, Inside inside = {});
 
   uint32_t leaf_count() const { return leaves_; }
-  const FloatBox& leaf_box(uint32_t leaf) const { return leaf_boxes_[leaf]; }
+  const FloatBox& leaf_box(uint32_t leaf) const { return nodes_[leaf_nodes_[leaf]]; }
   // The indices of the boxes in a leaf, and the boxes themselves.
   std::span<const uint32_t> leaf(uint32_t leaf) const;
   const LeafBoxes& boxes(uint32_t leaf) const { return packed_[leaf]; }
@@ -72,8 +82,14 @@ class BoxTree {
   };
   // Splits `part` until each piece has at most `smallest` leaves; appends the pieces to `parts`.
   void split(const Part& part, uint32_t smallest, std::vector<Part>& parts);
+  // Those whose nodes meets(node) accepts.
   template <class Meets>
   void find_leaves(uint32_t first, const Meets& meets, std::vector<uint32_t>& leaves) const;
+  // For find_pairs: leaves >= `own` that may hold faces near to its own.
+  void find_near_leaves(uint32_t own, std::vector<uint32_t>& leaves) const;
+  // Sets the oriented box of a node whose children, if any, have theirs.
+  void orient(const Part& part);
+  bool are_apart(uint32_t a, uint32_t b) const;
   void halve(const Part& part);
   void build(const Part& part);
   void join_boxes(const Part& part, uint32_t smallest);
@@ -82,7 +98,10 @@ class BoxTree {
   uint32_t leaves_;
   std::vector<Item> items_;
   std::vector<uint32_t> order_;
-  std::vector<FloatBox> nodes_, leaf_boxes_;
+  std::vector<FloatBox> nodes_;
+  std::vector<uint32_t> leaf_nodes_;
+  Inside inside_;
+  std::vector<std::unique_ptr<OrientedBox>> oriented_;  // of nodes; null: far larger than its own
   std::vector<LeafBoxes> packed_;
 };
 
@@ -94,7 +113,7 @@ std::vector<Item> BoxTree::find_pairs(int threads, const Skip& skip, const Appen
     std::vector<uint32_t> others;
     const auto begin = static_cast<uint32_t>(block) * kBlock;
     for (uint32_t own = begin; own < std::min(begin + kBlock, leaves_); ++own) {
-      find_leaves(leaf_box(own), own, others);
+      find_near_leaves(own, others);
       for (const uint32_t other : others)
         for (size_t k = 0; k < leaf(own).size(); ++k) {
           const uint32_t i = leaf(own)[k];
