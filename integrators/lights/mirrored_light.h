@@ -64,8 +64,11 @@ class MirroredLight {
     alignas(Highlight) std::byte highlights_[kMostImages * sizeof(Highlight)];
   };
 
-  // Both must outlive it. Null where the scene has no such light or surface.
-  static std::unique_ptr<MirroredLight> make(const Scene& scene, const Lights& lights);
+  enum class Use { kDerivatives, kImage };
+  // Both must outlive it. Null where the scene has no such light or surface; for an image also
+  // where they add little noise: what edges hide of them may still rule a derivative.
+  static std::unique_ptr<MirroredLight> make(const Scene& scene, const Lights& lights,
+                                             Use use = Use::kDerivatives);
 
   // surface: of the same scene, or of it as it has moved, where the materials that it had count.
   template <class S>
@@ -131,6 +134,7 @@ class MirroredLight {
   MirroredLight(const Scene& scene, const Lights& lights) : scene_(scene), lights_(lights) {}
   std::vector<Image> find_lights(const Scene& scene);
   void add(const FlatPart& part, const Bsdf& bsdf, const Vec3d& normal, const Image& source);
+  double noise(const Image& image) const;
   static std::vector<FlatPart> flat_parts(const Mesh& mesh, ShapeId shape);
   bool sees(const Image& image, const Vec3d& p, Highlight& highlight) const;
 

@@ -11,7 +11,7 @@ namespace limn {
 
 RadianceEstimator::RadianceEstimator(const Scene& scene, int threads, bool closed, Numbers numbers)
     : scene_(scene),
-      traced_(scene_, threads, {.closed = closed}),
+      traced_(scene_, threads, {.closed = closed, .image = true}),
       camera_(scene_.camera),
       filter_(scene_.film.filter),
       numbers_(numbers),

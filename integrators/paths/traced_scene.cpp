@@ -25,7 +25,11 @@ TracedScene::TracedScene(const Scene& scene, int threads, const Options& options
       lights_(scene),
       closed_(options.closed ? std::make_unique<ClosedLight>(scene, threads) : nullptr),
       viewpoints_(options.edges ? std::make_unique<Viewpoints>(scene) : nullptr),
-      mirrored_(options.closed ? nullptr : MirroredLight::make(scene, lights_)),
+      mirrored_(options.closed
+                    ? nullptr
+                    : MirroredLight::make(scene, lights_,
+                                          options.image ? MirroredLight::Use::kImage
+                                                        : MirroredLight::Use::kDerivatives)),
       flat_mirrors_(options.edges && find_smooth(scene) ? FlatMirrors::make(scene) : nullptr),
       context_{scene,
                *tracer_,

@@ -39,6 +39,8 @@ class TracedScene {
     std::shared_ptr<const CoincidentFaces> faces = nullptr;
     // Paths are those of differences (PathContext::unmoved).
     bool of_differences = false;
+    // Nothing but an image is made of the paths.
+    bool image = false;
   };
   // scene: with its parameters seeded; it must outlive this.
   TracedScene(const Scene& scene, int threads, const Options& options);

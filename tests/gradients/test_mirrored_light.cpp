@@ -655,5 +655,24 @@ TEST(MirroredLight, IsNotWhereNothingMirrors) {
   EXPECT_EQ(mirrored->mixture(at.surface, scattering).share, 0);
 }
 
+// Of a dielectric's coat little comes back; an image does without it, derivatives do not.
+TEST(MirroredLight, ImagesAreSparedFaintHighlights) {
+  const TempFiles files;
+  const auto images = [&](const std::string& gloss, MirroredLight::Use use) {
+    SceneParts parts;
+    parts.body = square("floor", 2, -90, {0, 0, 0}, gloss) +
+                 square("wall", 1, 0, {0, 1, -1}, diffuse("paint", "0.3, 0.3, 0.3")) +
+                 bulb({0, 1, 0}, 5);
+    const Scene scene = make_scene(files, parts);
+    return MirroredLight::make(scene, Lights(scene), use) != nullptr;
+  };
+  const std::string metal = conductor("gloss", 0.05);
+  const std::string coat =
+      "<bsdf type=\"roughplastic\"><float name=\"alpha\" value=\"0.05\"/></bsdf>";
+  EXPECT_TRUE(images(metal, MirroredLight::Use::kImage));
+  EXPECT_FALSE(images(coat, MirroredLight::Use::kImage));
+  EXPECT_TRUE(images(coat, MirroredLight::Use::kDerivatives));
+}
+
 }  // namespace
 }  // namespace limn
