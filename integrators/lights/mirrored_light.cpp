@@ -29,6 +29,11 @@ constexpr double kApart = 0.1;  // two of a pair, over an edge
 constexpr double kInPlane = 0x1p-20;
 // Flat parts that get this share of the light of another are as bright as it.
 constexpr double kAlike = 0.9;
+// The most that the middle of a flank is over the horizon [rad], how many times as far the middle
+// of the highlight may be from there, and the least part of a highlight that is worth it.
+constexpr double kMostRise = 0.5;
+constexpr double kFarthest = 4;
+constexpr double kLeastSeen = 1e-3;
 // The least angle of a cone of directions [rad]: those within narrower ones are lost by rounding.
 constexpr double kLeastCone = 1e-6;
 
@@ -357,6 +362,18 @@ bool MirroredLight::sees(const Image& image, const Vec3d& p, Highlight& highligh
   if (highlight.cone > 0) highlight.toward = normalize(shown - p);
   highlight.irradiance = image.albedo * highlight.nearness * highlight.nearness *
                          (image.emitter ? lights_.estimate(*image.emitter, x) : image.irradiance);
+  return true;
+}
+
+bool MirroredLight::turn_to_flank(Highlight& highlight, const Vec3d& n) {
+  const double angle = std::min(0.5 * highlight.half_angle, kMostRise);
+  const double sine = std::sin(angle), rise = sine - dot(n, highlight.toward);
+  if (!(rise > 0 && rise < kFarthest * sine)) return false;
+  const Vec3d toward = normalize(highlight.toward + n * rise);
+  const double cone = versine(angle), seen = 2 * kPi * cone * pdf(highlight, toward);
+  highlight.irradiance *= seen > kLeastSeen ? std::min(seen, 1.0) : 0;
+  highlight.toward = toward;
+  highlight.cone = cone;
   return true;
 }
 

@@ -75,14 +75,17 @@ class MirroredLight {
   Mixture mixture(const SurfacePoint<S>& surface, const Scattering<S>& scattering) const {
     Mixture mixture;
     mixture.rough = scattering.rough_share();
-    double sum = 0, of_emitters = 0;
+    double sum = 0, of_emitters = 0, least = 0;
     const Bsdf& bsdf = *scene_.shape(surface.face.shape).bsdf->side(scattering.front());
     for (const Image& image : images_) {
       Highlight& highlight = mixture.highlight(mixture.count);
       if (image.holds(surface.face) || !sees(image, value(surface.p), highlight)) continue;
+      const bool flank =
+          !bsdf.lobes().below && turn_to_flank(highlight, value(scattering.normal()));
       const double power =
           luminance(scattering.eval_value(bsdf, highlight.toward)) * highlight.irradiance;
       if (!(power > 0)) continue;
+      if (flank) least = kFlankShare;
       mixture.part[mixture.count++] = power;
       sum += power;
       if (image.emitter) of_emitters += highlight.irradiance;
@@ -92,7 +95,7 @@ class MirroredLight {
     mixture.elsewhere = environment_ + std::max(lit_, kScattered / kPi * of_emitters);
     // Five times as much gave the same error in the demo.
     const double share = sum / (sum + mixture.elsewhere);
-    if (std::isfinite(share)) mixture.share = std::min(share, kMostShare);
+    if (std::isfinite(share)) mixture.share = std::clamp(share, least, kMostShare);
     return mixture;
   }
   // The density at the unit direction w [1/sr], of which scattering alone has this one there; both
@@ -107,6 +110,9 @@ class MirroredLight {
 
  private:
   static constexpr double kMostShare = 0.5;  // not tuned
+  // Flanks have at least this share, though little of the light: it comes from a few directions,
+  // and derivatives there are large. Not tuned.
+  static constexpr double kFlankShare = 0.1;
   // What emitters send comes back from other surfaces with this share of it. Not tuned.
   static constexpr double kScattered = 0.5;
   static constexpr size_t kMostFaces = 256;  // of a mesh that is looked through for flat parts
@@ -137,6 +143,9 @@ class MirroredLight {
   double noise(const Image& image) const;
   static std::vector<FlatPart> flat_parts(const Mesh& mesh, ShapeId shape);
   bool sees(const Image& image, const Vec3d& p, Highlight& highlight) const;
+  // If the middle of a highlight is behind a surface of normal n or hardly before it, makes it the
+  // flank that the surface sees: directions within a cone, and their part of the irradiance.
+  static bool turn_to_flank(Highlight& highlight, const Vec3d& n);
 
   const Scene& scene_;
   const Lights& lights_;

@@ -215,6 +215,21 @@ TEST(MirroredLight, GrazingHighlightBesideTheMirrorImage) {
   EXPECT_LT(5 * squares[1].standard_error(), squares[0].standard_error());
 }
 
+// A wall sees the flank of a highlight in the floor, whose middle is behind the wall's plane.
+TEST(MirroredLight, FlankOfAHighlightBehindTheSurface) {
+  const TempFiles files;
+  SceneParts parts;
+  const std::string gloss = R"(<bsdf type="roughconductor"><float name="alpha" value="0.1"/>
+                               <string name="distribution" value="beckmann"/></bsdf>)";
+  parts.body = square("floor", 3, -90, {0, 0, 0}, gloss) +
+               square("wall", 0.3, 0, {0, 0.3, 0.4}, diffuse("paint", "0.7, 0.7, 0.7")) +
+               bulb({0.1, 3, 0.1}, 16);
+  const Scene scene = make_scene(files, parts);
+  const auto wall = [](double u, double v) { return Vec3d{0.4 * u - 0.2, 0.1 + 0.4 * v, 0.5}; };
+  const auto squares = squares_by_mixture(scene, 100000, wall, {0, 0, -1});
+  EXPECT_LT(2 * squares[1].mean(), squares[0].mean());
+}
+
 // A floor sees a lamp through a plate of rough glass.
 TEST(MirroredLight, RoughGlassShowsLights) {
   const TempFiles files;
