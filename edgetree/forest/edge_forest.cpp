@@ -10,6 +10,7 @@
 #include "edgetree/forest/forest_query.h"
 #include "edgetree/forest/forest_rejection.h"
 #include "edgetree/lobe/seen_edge.h"
+#include "limn/core/prefetch.h"
 
 namespace limn {
 namespace {
@@ -246,7 +247,7 @@ bool EdgeForest::list_outlines(const EdgeQuery& query, const DirectionCone& dire
       const ListedEdge listed{edge, impl_->end_of(node, lane, 0), impl_->end_of(node, lane, 1)};
       if (own.holds(listed)) continue;
       edges.push_back(listed);
-      __builtin_prefetch(&input.object(edge.object).edge(edge.edge));
+      prefetch(&input.object(edge.object).edge(edge.edge));
     }
   }
   return true;

@@ -8,6 +8,7 @@
 
 #include "edgetree/forest/forest_motion.h"
 #include "edgetree/simd.h"
+#include "limn/core/prefetch.h"
 #include "limn/edgetree/edges.h"
 
 namespace limn {
@@ -109,7 +110,7 @@ struct Forest {
     const size_t size = id < 0 ? sizeof(EdgeNode) : sizeof(InnerNode);
     constexpr size_t kLine = 64;
     for (size_t i = 0; i < size; i += kLine) {
-      __builtin_prefetch(static_cast<const char*>(node) + i);
+      prefetch(static_cast<const char*>(node) + i);
     }
   }
 

@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "limn/core/error.h"
+#include "limn/core/prefetch.h"
 #include "limn/edgetree/edge_sampler_types.h"
 
 namespace limn {
@@ -111,7 +112,7 @@ void Contours::list(const ContourPoint& at, const DirectionCone& cone, const Con
   const auto fetch = [&](const ListedEdge& edge) {
     const EdgeMesh& mesh = input_.object(edge.id.object);
     for (const FaceId face : mesh.edge(edge.id.edge).faces) {
-      if (face.valid()) __builtin_prefetch(&mesh.planes[face.index()]);
+      if (face.valid()) prefetch(&mesh.planes[face.index()]);
     }
   };
   for (size_t i = 0; i < listed.size(); ++i) {

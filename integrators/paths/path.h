@@ -157,6 +157,7 @@ class PathTracer {
   void move_along_edge(SurfacePoint<Place>& surface, FaceRef face, const Vec3d& direction) const;
   void fetch_face(FaceRef face) const;
   void fetch_corners(const Walk& walk) const;
+  void fetch_textures(std::span<Walk* const> walks) const;
   void find_sky(std::span<Walk* const> walks) const;
   // path_lights.h
   void choose_side(Walk& walk) const;

@@ -84,6 +84,7 @@ inline void PathTracer<S, Visitor>::follow(std::span<Walk* const> walks) {
   };
   while (count > 0) {
     if constexpr (kPlain) {
+      if (count > 1) fetch_textures({going, count});
       if (wide_) place_lights_wide({going, count});
     }
     keep([&](Walk& walk) { return begin_vertex(walk); });

@@ -3,6 +3,7 @@
 // into the cache for them. Included by path_follow.h.
 #include "integrators/paths/path.h"
 #include "limn/core/check.h"
+#include "limn/core/prefetch.h"
 
 namespace limn {
 
@@ -57,8 +58,9 @@ inline void PathTracer<S, Visitor>::move_along_edge(SurfacePoint<Place>& surface
 template <class S, class Visitor>
 inline void PathTracer<S, Visitor>::fetch_face(FaceRef face) const {
   const Mesh& mesh = c_.scene.shape(face.shape).mesh;
-  __builtin_prefetch(&mesh.faces[face.face.index()]);
-  if (!mesh.normal_ids.empty()) __builtin_prefetch(&mesh.normal_ids[face.face.index()]);
+  prefetch(&mesh.faces[face.face.index()]);
+  if (!mesh.normal_ids.empty()) prefetch(&mesh.normal_ids[face.face.index()]);
+  if (!mesh.uv_ids.empty()) prefetch(&mesh.uv_ids[face.face.index()]);
 }
 
 // The same of its corners; it is known then.
@@ -68,12 +70,29 @@ inline void PathTracer<S, Visitor>::fetch_corners(const Walk& walk) const {
   const FaceRef face = walk.hit.face;
   const Mesh& mesh = c_.scene.shape(face.shape).mesh;
   for (const uint32_t vertex : mesh.face(face.face)) {
-    __builtin_prefetch(&mesh.positions[vertex]);
+    prefetch(&mesh.positions[vertex]);
     if constexpr (!kPlain) {
       if (!mesh.position_tangents.empty()) mesh.position_tangents.fetch(vertex);
     }
   }
   if (mesh.normal_source != NormalSource::kFace) detail::fetch_shading<Place>(mesh, face.face);
+  if (mesh.textured && !mesh.uv_ids.empty()) {
+    for (const uint32_t i : mesh.uv_ids[face.face.index()]) prefetch(&mesh.uv_places[i]);
+  }
+}
+
+// The same of what textures hold where paths will scatter.
+template <class S, class Visitor>
+inline void PathTracer<S, Visitor>::fetch_textures(std::span<Walk* const> walks) const {
+  for (const Walk* const walk : walks) {
+    const SurfacePoint<Place>& surface = walk->surface;
+    const Mesh& mesh = surface.shape->mesh;
+    if (!mesh.textured || is_complete(walk->bounces)) continue;
+    const Bsdf* const side = surface.shape->bsdf->side(dot(surface.n_g, value(walk->wi)) > 0);
+    if (!side || side->texture_count() == 0) continue;
+    side->fetch(
+        texture_point<double>(mesh, surface.face.face, {value(surface.b[0]), value(surface.b[1])}));
+  }
 }
 
 // Where rays along walk.wo leave the scene, which has an environment; brings that into the cache.

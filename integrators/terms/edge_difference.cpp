@@ -8,6 +8,7 @@
 #include "integrators/paths/path_follow.h"
 #include "integrators/paths/straight_way.h"
 #include "limn/core/duplicate_faces.h"
+#include "limn/core/prefetch.h"
 
 namespace limn {
 
@@ -43,13 +44,13 @@ bool hides(const PathContext& context, const FaceSide& a, double slope_a, const 
 // Bring what nearest_faces reads into the cache: which corners faces have, and where these lie.
 void fetch_faces(const Scene& scene, const FacesAround& around) {
   for (const FaceRef face : around.faces) {
-    __builtin_prefetch(&scene.shape(face.shape).mesh.face(face.face));
+    prefetch(&scene.shape(face.shape).mesh.face(face.face));
   }
 }
 void fetch_corners(const Scene& scene, const FacesAround& around) {
   for (const FaceRef face : around.faces) {
     const Mesh& mesh = scene.shape(face.shape).mesh;
-    for (const uint32_t vertex : mesh.face(face.face)) __builtin_prefetch(&mesh.positions[vertex]);
+    for (const uint32_t vertex : mesh.face(face.face)) prefetch(&mesh.positions[vertex]);
   }
 }
 

@@ -3,6 +3,8 @@
 
 #include <limits>
 
+#include "limn/core/prefetch.h"
+
 namespace limn {
 namespace {
 
@@ -49,8 +51,8 @@ void EnvironmentMap::fill(const Image& image, bool sampled, HugePageVector<Texel
 
 void EnvironmentMap::fetch_texels(int column, int row) const {
   with_texels([&](const auto* texels) {
-    __builtin_prefetch(&texels[index(column, row)]);
-    __builtin_prefetch(&texels[index(column, row + 1)]);
+    prefetch(&texels[index(column, row)]);
+    prefetch(&texels[index(column, row + 1)]);
   });
 }
 
@@ -62,8 +64,8 @@ void EnvironmentMap::fetch_texels(const Point<wide::Doubles>& place) const {
       __builtin_convertvector(rows, Mask) * width_ + __builtin_convertvector(columns, Mask);
   with_texels([&](const auto* texels) {
     for (int i = 0; i < wide::kWidth; ++i) {
-      __builtin_prefetch(&texels[first[i]]);
-      __builtin_prefetch(&texels[first[i] + width_]);
+      prefetch(&texels[first[i]]);
+      prefetch(&texels[first[i] + width_]);
     }
   });
 }

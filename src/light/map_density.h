@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "limn/core/prefetch.h"
 #include "src/base/huge_pages.h"
 #include "src/base/wide.h"
 
@@ -41,9 +42,7 @@ class MapDensity {
   // column, row: the cell of (x, y). cos_theta: that of y. [1/sr]
   double pdf(int column, int row, double x, double cos_theta) const;
   // Prefetches the data that `pdf` will read for the cell.
-  void fetch(int column, int row) const {
-    __builtin_prefetch(&leaf(square(column, row), column, row));
-  }
+  void fetch(int column, int row) const { prefetch(&leaf(square(column, row), column, row)); }
 
   size_t leaf_count() const { return leaves_.size(); }
 

@@ -113,10 +113,11 @@ Matrix4 parse_scale(const XmlElement& e) {
 Matrix4 parse_rotate(const XmlElement& e) {
   check_attributes(e, {"value", "x", "y", "z", "angle"}, {"angle"});
   Vec3d axis = parse_vector(e, 0, false).value_or(Vec3d{});
+  const double angle = parse_number(e, *e.find("angle")) * (kPi / 180);
+  if (angle == 0) return {};  // about whatever axis, or none
   const double size = std::hypot(axis.x, axis.y, axis.z);
   if (!(size > 0)) throw InputError(e.where, "<rotate>: the axis is zero");
   axis = axis / size;
-  const double angle = parse_number(e, *e.find("angle")) * (kPi / 180);
   const double c = std::cos(angle), s = std::sin(angle);
   Vec3d columns[3];
   for (int i = 0; i < 3; ++i) {

@@ -23,10 +23,10 @@ struct Neighbours {
 };
 
 // The texel that column -1 to `size` stands for (-1 to 2 size, mirrored).
-uint32_t wrapped(int64_t i, int64_t size, Wrap wrap) {
+inline uint32_t wrapped(int i, int size, Wrap wrap) {
   if (wrap == Wrap::kRepeat) return static_cast<uint32_t>(i < 0 ? size - 1 : i >= size ? 0 : i);
   if (wrap == Wrap::kMirror && i >= size) i = 2 * size - 1 - i;
-  return static_cast<uint32_t>(std::clamp<int64_t>(i, 0, size - 1));
+  return static_cast<uint32_t>(std::clamp(i, 0, size - 1));
 }
 
 // x: texture coordinate along an axis of `size` texels, in units of the image.
@@ -39,16 +39,16 @@ S reduced(const S& x, Wrap wrap) {
 }
 
 template <class S>
-Neighbours<S> neighbours(const S& x, int size, Wrap wrap) {
+[[gnu::always_inline]] inline Neighbours<S> neighbours(const S& x, int size, Wrap wrap) {
   const S place = reduced(x, wrap) * static_cast<double>(size) - 0.5;
   const double first = std::floor(value(place));
-  const auto i = static_cast<int64_t>(first);
+  const int i = static_cast<int>(first);
   return {wrapped(i, size, wrap), wrapped(i + 1, size, wrap), place - first};
 }
 
 uint32_t nearest(double x, int size, Wrap wrap) {
   const double place = std::floor(reduced(x, wrap) * size);
-  return wrapped(static_cast<int64_t>(place), size, wrap);
+  return wrapped(static_cast<int>(place), size, wrap);
 }
 
 struct Settings {
@@ -76,6 +76,13 @@ class Bitmap final : public Texture {
       for (int c = 0; c < 3; ++c) v[c].d[lane] += d[c];
     }
     return of_use(v);
+  }
+  void fetch(const TexturePoint<double>& point) const override {
+    if (texels_->count() < kFewTexels) return;
+    const std::array<double, 2> uv = settings_.to_uv(point.uv);
+    const auto x = neighbours(uv[0], texels_->width(), settings_.wrap);
+    const auto y = neighbours(uv[1], texels_->height(), settings_.wrap);
+    texels_->fetch({x.first, x.second}, {y.first, y.second});
   }
   std::shared_ptr<Texture> for_numbers() const override {
     const auto copy = std::make_shared<Bitmap>(*this);
@@ -135,6 +142,7 @@ class Bitmap final : public Texture {
 
  private:
   static constexpr const char* kChanged = ", changed";
+  static constexpr size_t kFewTexels = 1 << 16;  // mostly in the cache anyway; not tuned
 
   template <class S>
   Rgb<S> of_use(const Rgb<S>& c) const {
@@ -161,7 +169,13 @@ class Bitmap final : public Texture {
     }
     const Neighbours<S> x = neighbours(uv[0], texels.width(), settings_.wrap);
     const Neighbours<S> y = neighbours(uv[1], texels.height(), settings_.wrap);
-    const std::array<Rgb<double>, 4> c = texels.square({x.first, x.second}, {y.first, y.second});
+    const std::array<FourDoubles, 4> c = texels.square({x.first, x.second}, {y.first, y.second});
+    if constexpr (std::is_same_v<S, double>) {
+      const FourDoubles top = c[0] + x.share * (c[1] - c[0]);
+      const FourDoubles bottom = c[2] + x.share * (c[3] - c[2]);
+      const FourDoubles v = top + y.share * (bottom - top);
+      return {v[0], v[1], v[2]};
+    }
     Rgb<S> v;
     for (int k = 0; k < 3; ++k) {
       const S top = c[0][k] + x.share * (c[1][k] - c[0][k]);

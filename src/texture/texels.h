@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "limn/core/image.h"
+#include "limn/core/prefetch.h"
 #include "limn/core/vec.h"
 #include "src/base/half.h"
 #include "src/base/huge_pages.h"
@@ -25,19 +26,25 @@ class Texels {
   int height() const { return height_; }
   size_t count() const { return static_cast<size_t>(width_) * height_; }
 
-  // Those of two columns in one row, then of the same in the other.
-  std::array<Rgb<double>, 4> square(const std::array<uint32_t, 2>& columns,
+  // Those of two columns in one row, then of the same in the other; the fourth number is 0.
+  std::array<FourDoubles, 4> square(const std::array<uint32_t, 2>& columns,
                                     const std::array<uint32_t, 2>& rows) const {
-    std::array<size_t, 4> at;
-    for (size_t i = 0; i < 4; ++i) at[i] = place(columns[i % 2], rows[i / 2]);
-    std::array<Rgb<double>, 4> texels;
-    fetch(at, texels);
+    std::array<FourDoubles, 4> texels;
+    read(places(columns, rows), texels);
     return texels;
   }
+  // Brings these into the cache, mostly: of bytes, in all but one case of sixteen.
+  void fetch(const std::array<uint32_t, 2>& columns, const std::array<uint32_t, 2>& rows) const {
+    std::visit(
+        [&](const auto& all) {
+          for (size_t i = 0; i < 2; ++i) prefetch(&all[place(columns[i], rows[i])]);
+        },
+        all_);
+  }
   Rgb<double> texel(uint32_t column, uint32_t row) const {
-    std::array<Rgb<double>, 1> texel;
-    fetch<1>({place(column, row)}, texel);
-    return texel[0];
+    std::array<FourDoubles, 1> texel;
+    read<1>({place(column, row)}, texel);
+    return {texel[0][0], texel[0][1], texel[0][2]};
   }
   Image image() const;
 
@@ -62,21 +69,25 @@ class Texels {
     const size_t tile = static_cast<size_t>(row / kTile) * tiles_across_ + column / kTile;
     return (tile * kTile + row % kTile) * kTile + column % kTile;
   }
+  std::array<size_t, 4> places(const std::array<uint32_t, 2>& columns,
+                               const std::array<uint32_t, 2>& rows) const {
+    return {place(columns[0], rows[0]), place(columns[1], rows[0]), place(columns[0], rows[1]),
+            place(columns[1], rows[1])};
+  }
   template <size_t N>
-  void fetch(const std::array<size_t, N>& at, std::array<Rgb<double>, N>& texels) const {
+  void read(const std::array<size_t, N>& at, std::array<FourDoubles, N>& texels) const {
     std::visit(
         [&](const auto& all) {
-          for (size_t i = 0; i < N; ++i) {
-            const auto& t = all[at[i]];
-            texels[i] = {number(t[0]), number(t[1]), number(t[2])};
-          }
+          for (size_t i = 0; i < N; ++i) texels[i] = numbers(all[at[i]]);
         },
         all_);
   }
 
-  double number(uint8_t byte) const { return table_[byte]; }
-  static double number(float v) { return v; }
-  static double number(Half v) { return v; }
+  FourDoubles numbers(const std::array<uint8_t, 4>& t) const {
+    return to_doubles(std::array{table_[t[0]], table_[t[1]], table_[t[2]], 0.0f});
+  }
+  static FourDoubles numbers(const std::array<Half, 4>& t) { return to_doubles(t); }
+  static FourDoubles numbers(const std::array<float, 4>& t) { return to_doubles(t); }
 
   // of(i): the i-th of the interleaved numbers, row 0 first.
   template <class Number, class Of>

@@ -209,6 +209,13 @@ TEST(OtherScenes, NamesOfEarlierFormats) {
                                      "path, without parameters of its own"});
 }
 
+TEST(OtherScenes, RotationsByZeroNeedNoAxis) {
+  const Scene scene = read(
+      "<shape type=\"rectangle\"><transform name=\"to_world\"><rotate x=\"0\" y=\"0\" "
+      "z=\"0\" angle=\"0\"/><scale value=\"2\"/></transform></shape>");
+  EXPECT_EQ(bounds_of(scene.shapes[0].mesh).upper.x, 2);
+}
+
 TEST(OtherScenes, TypesThatAreGone) {
   std::vector<std::string> warnings;
   const Scene scene = read_scene_text(

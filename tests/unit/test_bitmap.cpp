@@ -140,7 +140,7 @@ TEST(Bitmap, TexelsHaveColumnsAndRows) {
   const auto four = texels.square({3, 8}, {5, 0});
   for (const auto& [texel, column, row] :
        {std::tuple{four[0], 3, 5}, {four[1], 8, 5}, {four[2], 3, 0}, {four[3], 8, 0}}) {
-    EXPECT_EQ(texel.r, image.data[static_cast<size_t>(3 * (9 * row + column))]);
+    EXPECT_EQ(texel[0], image.data[static_cast<size_t>(3 * (9 * row + column))]);
   }
 }
 

@@ -71,10 +71,10 @@ TEST(Includes, NothingPointsUpward) {
 // film, image or ray.
 TEST(Includes, EdgetreeSeesNoScene) {
   const std::vector<std::string> allowed = {
-      "limn/edgetree/",     "limn/core/mesh.h",    "limn/core/vec.h",   "limn/core/dual.h",
-      "limn/core/rng.h",    "limn/core/lobe.h",    "limn/core/error.h", "limn/core/parallel.h",
-      "limn/core/bounds.h", "limn/core/check.h",   "limn/core/names.h", "limn/core/box_tree.h",
-      "limn/core/touch.h",  "limn/core/settings.h"};
+      "limn/edgetree/",     "limn/core/mesh.h",     "limn/core/vec.h",     "limn/core/dual.h",
+      "limn/core/rng.h",    "limn/core/lobe.h",     "limn/core/error.h",   "limn/core/parallel.h",
+      "limn/core/bounds.h", "limn/core/check.h",    "limn/core/names.h",   "limn/core/box_tree.h",
+      "limn/core/touch.h",  "limn/core/settings.h", "limn/core/prefetch.h"};
   EXPECT_EQ(strays("edgetree", allowed), Strings{});
   EXPECT_EQ(strays("include/limn/edgetree", allowed), Strings{});
 }
@@ -141,6 +141,7 @@ TEST(Includes, NothingRunsBackUpBetweenRooms) {
 // The contracts of limn/core, lowest first: each includes only earlier ones. A room of src sees
 // contracts up to the one given.
 const Strings kContracts = {"check.h",
+                            "prefetch.h",
                             "renew.h",
                             "error.h",
                             "field_error.h",

@@ -131,6 +131,11 @@ class Bsdf {
     for (int k = 0; k < texture_count_; ++k) at[k] = texture(k).eval(point);
   }
 
+  // Brings what `resolve` reads into the cache.
+  void fetch(const TexturePoint<double>& point) const {
+    for (int k = 0; k < texture_count_; ++k) texture(k).fetch(point);
+  }
+
   virtual std::shared_ptr<Bsdf> clone() const = 0;  // deep
   // Nested BSDFs. deep_copy() uses them to preserve sharing.
   virtual std::span<std::shared_ptr<Bsdf>> nested() { return {}; }

@@ -18,6 +18,7 @@
 
 #include "limn/core/dual.h"
 #include "limn/core/mesh.h"
+#include "limn/core/prefetch.h"
 #include "limn/core/vec.h"
 
 namespace limn::detail {
@@ -78,8 +79,8 @@ template <class S>
 void fetch_shading(const Mesh& mesh, FaceId face) {
   const auto fetch = [](const auto& values, uint32_t i) {
     const char* begin = reinterpret_cast<const char*>(&values[i]);
-    __builtin_prefetch(begin);
-    if (sizeof(values[i]) > 64) __builtin_prefetch(begin + sizeof(values[i]) - 1);
+    prefetch(begin);
+    if (sizeof(values[i]) > 64) prefetch(begin + sizeof(values[i]) - 1);
   };
   const FaceIndices& ids = mesh.normal_ids[face.index()];
   const FaceIndices& vertices = mesh.face(face);

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "limn/core/dual.h"
+#include "limn/core/prefetch.h"
 #include "limn/core/vec.h"
 
 namespace limn {
@@ -31,8 +32,8 @@ class Tangents {
 
   // Brings vector i into the cache.
   void fetch(size_t i) const {
-    __builtin_prefetch(address(i));
-    if (lanes_ > 2) __builtin_prefetch(address(i) + stride() - 1);
+    prefetch(address(i));
+    if (lanes_ > 2) prefetch(address(i) + stride() - 1);
   }
 
   void clear() { *this = {}; }

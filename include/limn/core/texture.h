@@ -34,6 +34,8 @@ class Texture : public TexelMap {
   // Three channels; a texture of numbers (see for_numbers) gives one number three times.
   virtual Rgb<double> eval(const TexturePoint<double>& point) const = 0;
   virtual Rgb<Dual> eval(const TexturePoint<Dual>& point) const = 0;
+  // Brings what `eval` reads there into the cache.
+  virtual void fetch(const TexturePoint<double>& /*point*/) const {}
 
   // The same texture where one number is expected (a roughness, a weight): texels give their
   // luminance, other colours number_of. It shares no mutable data with this one.

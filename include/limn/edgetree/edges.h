@@ -10,6 +10,7 @@
 
 #include "limn/core/dual.h"
 #include "limn/core/mesh.h"
+#include "limn/core/prefetch.h"
 #include "limn/core/vec.h"
 #include "limn/edgetree/edge_class.h"
 
@@ -120,15 +121,15 @@ struct EdgeMesh {
   // Prefetch for edges used soon: fetch_edge loads the edge, and the second function, once it is
   // there, its ends and faces.
   void fetch_edge(EdgeId id) const {
-    __builtin_prefetch(&edges[id.index()]);
-    __builtin_prefetch(&face_offsets[id.index()]);
+    prefetch(&edges[id.index()]);
+    prefetch(&face_offsets[id.index()]);
   }
   void fetch_ends(EdgeId id) const {
     for (const VertexId vertex : edge(id).vertices) {
-      __builtin_prefetch(&positions[vertex.index()]);
+      prefetch(&positions[vertex.index()]);
       if (!tangents.empty()) tangents.fetch(vertex.index());
     }
-    __builtin_prefetch(incident_faces.data() + face_offsets[id.index()]);
+    prefetch(incident_faces.data() + face_offsets[id.index()]);
   }
   uint64_t count(EdgeClass edge_class) const;
 };
