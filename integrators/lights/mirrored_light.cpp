@@ -37,9 +37,9 @@ constexpr double kLeastSeen = 1e-3;
 // The least angle of a cone of directions [rad]: those within narrower ones are lost by rounding.
 constexpr double kLeastCone = 1e-6;
 
-// Of noise(): highlights with less are not worth their time in an image, a tenth to a half of it. In
-// six furnished rooms it was 3e-5 to .025 and they made no image less noisy, in the demo .009; .06
-// in scenes/sharp_shadow.xml, where they take away two thirds of the variance.
+// Of noise(): highlights with less are not worth their time in an image, a tenth to a half of it.
+// In six furnished rooms it was 3e-5 to .025 and they made no image less noisy, in the demo .009;
+// .06 in scenes/sharp_shadow.xml, where they take away two thirds of the variance.
 constexpr double kLeastNoise = 0.04;
 
 // Any two unit vectors that are orthogonal to n and to each other.
@@ -276,8 +276,8 @@ std::vector<MirroredLight::Image> MirroredLight::find_lights(const Scene& scene)
   return found;
 }
 
-// The variance with which paths find the highlight by the scattering of diffuse surfaces alone, over
-// the square of what else these see: the mean over the shapes, hidden or not.
+// The variance with which paths find the highlight by the scattering of diffuse surfaces alone,
+// over the square of what else these see: the mean over the shapes, hidden or not.
 double MirroredLight::noise(const Image& image) const {
   return mean_over_shapes(scene_, [&](const Vec3d& p, const Vec3d&) {
     Highlight highlight;
