@@ -94,6 +94,25 @@ TEST_P(MissingTerm, IsNoticedAndNamed) {
 INSTANTIATE_TEST_SUITE_P(, MissingTerm, testing::Values("interior", "camera", "boundary", "direct"),
                          [](const auto& test) { return test.param; });
 
+// So many edges lie before the lamp that not every vertex lists their silhouettes: those of a rough
+// ball, which hangs over what is seen.
+TEST(AgainstDifferences, ManyEdgesBeforeALamp) {
+  const TempFiles files;
+  Mesh ball = icosphere_mesh(6);
+  for (size_t i = 0; i < ball.positions.size(); ++i) {
+    const auto height = static_cast<float>(i * 7919 % 13);
+    ball.positions[i] = ball.positions[i] * (1 + 0.01f * height);
+  }
+  SceneParts parts;
+  parts.origin = {0, 0.8, 2};
+  parts.target = {0, 0, 0};
+  parts.body = obj_shape("ball", write_mesh(files, "ball.obj", ball), false, 0.5, {0, 1.5, 0},
+                         diffuse("skin", "0.8, 0.8, 0.8")) +
+               square("floor", 3, -90, {0, 0, 0}, diffuse("ground", "0.8, 0.8, 0.8")) +
+               square("lamp", 0.6, 90, {0, 3.5, 0}, area_light("glow", "15, 15, 15"));
+  expect_agreement(make_scene(files, parts), "ball.scale", 256);
+}
+
 // A ball so coarse that its shading normals lie far from the geometric ones.
 class CoarseBall : public testing::TestWithParam<std::tuple<std::string, int>> {
  protected:
