@@ -18,9 +18,9 @@ namespace {
 
 // Deeper in glass the least step leads paths elsewhere.
 constexpr int kMostDepth = 8;
-// Over the natural one. Long steps bend, short ones round: right derivatives agree at two of three.
+// Over the natural one. Long steps bend, short ones round: right derivatives agree at two of four.
 // At one alone a wrong one may, by chance.
-constexpr double kSteps[] = {1, 1e-2, 1e-4};
+constexpr double kSteps[] = {1, 1e-2, 1e-4, 1e-6};
 
 std::vector<double> derivative_of(const Scene& scene, const Parameter& parameter,
                                   const RunSettings& settings, PathsCheck& check) {

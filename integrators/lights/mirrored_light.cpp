@@ -37,10 +37,11 @@ constexpr double kLeastSeen = 1e-3;
 // The least angle of a cone of directions [rad]: those within narrower ones are lost by rounding.
 constexpr double kLeastCone = 1e-6;
 
-// Of noise(): highlights with less are not worth their time in an image, a tenth to a half of it.
-// In six furnished rooms it was 3e-5 to .025 and they made no image less noisy, in the demo .009;
-// .06 in scenes/sharp_shadow.xml, where they take away two thirds of the variance.
-constexpr double kLeastNoise = 0.04;
+// Of noise(): to draw highlights with less makes no image less noisy, and takes a tenth to a half
+// more time; those with twice as much are drawn in full, others in part. In six furnished rooms it
+// was up to .041, in the demo .017; .16 in scenes/sharp_shadow.xml, where they take away two thirds
+// of the variance.
+constexpr double kLeastNoise = 0.042;
 
 // Any two unit vectors that are orthogonal to n and to each other.
 std::array<Vec3d, 2> across(const Vec3d& n) {
@@ -106,18 +107,16 @@ double share_in_highlight(const Bsdf& bsdf, const Vec3d& n, const Vec3d& light, 
   return std::min(sum / kPairs, 1.0);
 }
 
-// The mean over the shapes that do not emit of a number for places on them: a wide ground counts no
-// more than what stands on it. It gets two near places of a face: an emitter may hang just over
-// one. Places move with the faces, so that the mean is continuous in what moves these.
-template <class Number>
-double mean_over_shapes(const Scene& scene, const Number& number) {
-  double sum = 0;
-  size_t count = 0;
+// For each shape that does not emit calls take() with the mean of a number for places on it, which
+// gets two near places of a face: an emitter may hang just over one. Places move with the faces, so
+// that the means are continuous in what moves these.
+template <class Number, class Take>
+void find_means(const Scene& scene, const Number& number, const Take& take) {
   for (const Shape& shape : scene.shapes) {
     const size_t faces = shape.mesh.faces.size();
     if (shape.is_emitter || faces == 0) continue;
     const size_t step = (faces + kPairs - 1) / kPairs, pairs = std::max<size_t>(1, kPairs / faces);
-    const auto places = static_cast<double>((faces + step - 1) / step * pairs);
+    double sum = 0;
     for (size_t f = 0; f < faces; f += step) {
       const auto corners = face_corners<double>(shape.mesh, FaceId(static_cast<uint32_t>(f)));
       const Vec3d edge = corners[1] - corners[0];
@@ -128,12 +127,11 @@ double mean_over_shapes(const Scene& scene, const Number& number) {
           v = 1 - v;
         }
         const Vec3d p = corners[0] + edge * u + (corners[2] - corners[0]) * v;
-        sum += number(p, p + edge * kApart) / places;
+        sum += number(p, p + edge * kApart);
       }
     }
-    ++count;
+    take(sum / static_cast<double>((faces + step - 1) / step * pairs));
   }
-  return count > 0 ? sum / static_cast<double>(count) : 0;
 }
 
 }  // namespace
@@ -220,8 +218,10 @@ std::unique_ptr<MirroredLight> MirroredLight::make(const Scene& scene, const Lig
     }
   }
   if (use == Use::kImage) {
-    std::erase_if(result->images_,
-                  [&](const Image& image) { return !(result->noise(image) > kLeastNoise); });
+    for (Image& image : result->images_) {
+      image.weight = std::clamp(result->noise(image) / kLeastNoise - 1, 0.0, 1.0);
+    }
+    std::erase_if(result->images_, [](const Image& image) { return image.weight == 0; });
   }
   if (result->images_.empty()) return nullptr;
   return result;
@@ -255,13 +255,18 @@ std::vector<MirroredLight::Image> MirroredLight::find_lights(const Scene& scene)
     const LightOrigin origin = delta->origin();
     add_emitter(number++, origin.infinite, origin.infinite ? -value(origin.v) : value(origin.v), 0);
   }
-  lit_ = kLit / kPi * mean_over_shapes(scene, [&](const Vec3d& p, const Vec3d& q) {
-           double sum = 0;
-           for (const size_t e : emitters) {
-             sum += std::min(lights_.estimate(e, p), lights_.estimate(e, q));
-           }
-           return sum;
-         });
+  const auto irradiance = [&](const Vec3d& p, const Vec3d& q) {
+    double sum = 0;
+    for (const size_t e : emitters) sum += std::min(lights_.estimate(e, p), lights_.estimate(e, q));
+    return sum;
+  };
+  double sum = 0;
+  size_t shapes = 0;  // a wide ground counts no more than what stands on it
+  find_means(scene, irradiance, [&](double mean) {
+    sum += mean;
+    ++shapes;
+  });
+  lit_ = shapes > 0 ? kLit / kPi * sum / static_cast<double>(shapes) : 0;
   if (!scene.environment) return found;
   environment_ = scene.environment->mean_luminance();
   for (const BrightPatch& patch : find_bright_patches(*scene.environment)) {
@@ -277,9 +282,9 @@ std::vector<MirroredLight::Image> MirroredLight::find_lights(const Scene& scene)
 }
 
 // The variance with which paths find the highlight by the scattering of diffuse surfaces alone,
-// over the square of what else these see: the mean over the shapes, hidden or not.
+// over the square of what else these see: of the shape with the most, hidden or not.
 double MirroredLight::noise(const Image& image) const {
-  return mean_over_shapes(scene_, [&](const Vec3d& p, const Vec3d&) {
+  const auto at = [&](const Vec3d& p, const Vec3d&) {
     Highlight highlight;
     if (!sees(image, p, highlight)) return 0.0;
     const double of_emitter = image.emitter ? kScattered / kPi * highlight.irradiance : 0;
@@ -287,7 +292,10 @@ double MirroredLight::noise(const Image& image) const {
     const double ratio = highlight.irradiance / (kPi * elsewhere);
     const double cone = highlight.cone > 0 ? highlight.cone : versine(highlight.half_angle);
     return ratio * ratio / (2 * cone);
-  });
+  };
+  double most = 0;
+  find_means(scene_, at, [&](double mean) { most = std::max(most, mean); });
+  return most;
 }
 
 // Keeps those that mirror the most light; of what is about alike the first. Neither the choice nor

@@ -66,7 +66,7 @@ class MirroredLight {
 
   enum class Use { kDerivatives, kImage };
   // Both must outlive it. Null where the scene has no such light or surface; for an image also
-  // where they add little noise: what edges hide of them may still rule a derivative.
+  // where such highlights add little noise: they may still rule a derivative at edges before them.
   static std::unique_ptr<MirroredLight> make(const Scene& scene, const Lights& lights,
                                              Use use = Use::kDerivatives);
 
@@ -82,13 +82,13 @@ class MirroredLight {
       if (image.holds(surface.face) || !sees(image, value(surface.p), highlight)) continue;
       const bool flank =
           !bsdf.lobes().below && turn_to_flank(highlight, value(scattering.normal()));
-      const double power =
-          luminance(scattering.eval_value(bsdf, highlight.toward)) * highlight.irradiance;
+      const double power = image.weight * luminance(scattering.eval_value(bsdf, highlight.toward)) *
+                           highlight.irradiance;
       if (!(power > 0)) continue;
       if (flank) least = kFlankShare;
       mixture.part[mixture.count++] = power;
       sum += power;
-      if (image.emitter) of_emitters += highlight.irradiance;
+      if (image.emitter) of_emitters += image.weight * highlight.irradiance;
     }
     if (!(sum > 0)) return mixture;
     for (int i = 0; i < mixture.count; ++i) mixture.part[i] /= sum;
@@ -135,6 +135,7 @@ class MirroredLight {
     std::optional<size_t> emitter;  // which of all lights it is; none: a patch
     double irradiance = 0;          // across it, at the part's center
     double light_in_part = 0;       // how much of it falls on the part
+    double weight = 1;              // of the share of directions that it gets
   };
   struct FlatPart;
   MirroredLight(const Scene& scene, const Lights& lights) : scene_(scene), lights_(lights) {}

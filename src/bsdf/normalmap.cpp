@@ -69,7 +69,7 @@ std::shared_ptr<Bsdf> read_mapped_bsdf(Properties& properties, int own) {
     properties.fail("takes no bsdf that passes light (remove the map): " + nested->describe());
   }
   if (nested->side(false) && nested->side(false) != nested->side(true)) {
-    properties.fail("takes no twosided of two bsdfs: put a map into each of them");
+    properties.fail("takes no bsdf whose sides differ: put a map into each of them");
   }
   return nested;
 }

@@ -155,7 +155,9 @@ void upgrade_colour(XmlElement& element) {
     }
   } else if (is_srgb) {
     const std::vector<std::string_view> parts = split(value->value, ", \t\n\r");
-    for (size_t i = 0; i < 3 && parts.size() == 3; ++i) channels[i] = parse_double(parts[i]);
+    for (size_t i = 0; i < 3 && (parts.size() == 3 || parts.size() == 1); ++i) {
+      channels[i] = parse_double(parts[i % parts.size()]);
+    }
   }
   element.name = "rgb";
   if (!channels[0] || !channels[1] || !channels[2]) return;  // as it is, or an error of <rgb>
@@ -181,8 +183,6 @@ void upgrade_element(XmlElement& element, std::vector<std::string>& warnings) {
   if (element.name != "default") {
     if (XmlAttribute* name = attribute(element, "name")) name->value = snake_case(name->value);
   }
-  upgrade_colour(element);
-  upgrade_filter(element, warnings);
   replace_type(element, warnings);
   drop_parameters(element, warnings);
   const bool is_diffuse = element.name == "bsdf" && has_value(element, "type", "diffuse");
@@ -197,8 +197,14 @@ void upgrade_element(XmlElement& element, std::vector<std::string>& warnings) {
 
 }  // namespace
 
-void upgrade(XmlElement& scene, std::vector<std::string>& warnings) {
-  if (scene.name != "scene") return;
+void upgrade_values(XmlElement& element, std::vector<std::string>& warnings) {
+  upgrade_colour(element);
+  upgrade_filter(element, warnings);
+  for (XmlElement& child : element.children) upgrade_values(child, warnings);
+}
+
+bool upgrade(XmlElement& scene, std::vector<std::string>& warnings) {
+  if (scene.name != "scene") return false;
   check_attributes(scene, {"version"}, {"version"});
   const XmlAttribute& version = *scene.find("version");
   const std::vector<std::string_view> parts = split(version.value, ".");
@@ -214,6 +220,7 @@ void upgrade(XmlElement& scene, std::vector<std::string>& warnings) {
                                         " is not supported (known: 0.4.0 to 3.x)");
   }
   if (major < 2) upgrade_element(scene, warnings);
+  return major < 2;
 }
 
 }  // namespace limn

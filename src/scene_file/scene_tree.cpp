@@ -59,8 +59,9 @@ class TreeLoader {
   SceneTree load(const std::string& file, const std::string* text) {
     tree_.search_path.insert(tree_.search_path.begin(), fs::path(file).parent_path().string());
     tree_.root = text ? parse_xml(file, *text) : parse_file(file, {file});
-    upgrade(tree_.root, tree_.warnings);
+    const bool is_old = upgrade(tree_.root, tree_.warnings);
     expand(tree_.root, 0, true);
+    if (is_old) upgrade_values(tree_.root, tree_.warnings);
     if (is_incomplete_) throw InputErrors();
     check_defines(file);
     return std::move(tree_);
@@ -174,8 +175,9 @@ class TreeLoader {
     }
     XmlElement root = parse_file(file, name.where);
     const bool is_scene = root.name == "scene";
-    if (is_scene) upgrade(root, tree_.warnings);
+    const bool is_old = is_scene && upgrade(root, tree_.warnings);
     expand(root, depth + 1, is_scene);
+    if (is_old) upgrade_values(root, tree_.warnings);
     if (!is_scene) {
       parent.children.push_back(std::move(root));
       return;

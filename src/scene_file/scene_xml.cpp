@@ -556,16 +556,21 @@ class SceneBuilder {
   const ObjectDescription* environment_ = nullptr;
 };
 
-// A warning's text without what tells two of a kind apart: its place, numbers and names.
-std::string kind_of(const std::string& text) {
-  std::string kind;
-  bool in_name = false;
+// A text without its numbers, and these: warnings of a kind differ in place and numbers alone.
+std::pair<std::string, std::string> kind_and_numbers(const std::string& text) {
+  std::string kind, numbers;
+  bool in_number = false, in_name = false;
   for (const char c : text) {
     if (c == '"') in_name = !in_name;
-    const bool is_number = (c >= '0' && c <= '9') || c == '.';
-    if (!in_name && !is_number) kind += c;
+    const bool is_digit = !in_name && c >= '0' && c <= '9';
+    in_number = is_digit || (in_number && c == '.');
+    if (is_digit && (kind.empty() || kind.back() != '#')) {
+      numbers += numbers.empty() ? "" : ", ";
+      kind += '#';
+    }
+    (in_number ? numbers : kind) += c;
   }
-  return kind;
+  return {kind, numbers};
 }
 
 // From the third of a kind on, warnings become one that lists their places.
@@ -574,7 +579,8 @@ void shorten(std::vector<std::string>& warnings) {
   std::map<std::string, std::vector<size_t>> kinds;  // indices of warnings
   for (size_t i = 0; i < warnings.size(); ++i) {
     const size_t mark = warnings[i].find(kMark);
-    if (mark != std::string::npos) kinds[kind_of(warnings[i].substr(mark))].push_back(i);
+    if (mark != std::string::npos)
+      kinds[kind_and_numbers(warnings[i].substr(mark)).first].push_back(i);
   }
   for (const auto& [kind, members] : kinds) {
     if (members.size() < 4) continue;
@@ -584,7 +590,11 @@ void shorten(std::vector<std::string>& warnings) {
     };
     std::string list = warnings[members[2]].substr(0, warnings[members[2]].find(kMark)) + kMark +
                        fmt::format("like that of {}, {} more: ", place(1), members.size() - 2);
-    for (size_t k = 2; k < members.size(); ++k) list += (k > 2 ? ", " : "") + place(k);
+    for (size_t k = 2; k < members.size(); ++k) {
+      const std::string& text = warnings[members[k]];
+      const std::string numbers = kind_and_numbers(text.substr(text.find(kMark))).second;
+      list += (k > 2 ? ", " : "") + place(k) + (numbers.empty() ? "" : " (" + numbers + ")");
+    }
     for (size_t k = 3; k < members.size(); ++k) warnings[members[k]].clear();
     warnings[members[2]] = list;
   }

@@ -677,13 +677,13 @@ TEST(MirroredLight, ImagesAreSparedFaintHighlights) {
     SceneParts parts;
     parts.body = square("floor", 2, -90, {0, 0, 0}, gloss) +
                  square("wall", 1, 0, {0, 1, -1}, diffuse("paint", "0.3, 0.3, 0.3")) +
-                 bulb({0, 1, 0}, 5);
+                 bulb({0, 1.5, 1}, 5);
     const Scene scene = make_scene(files, parts);
     return MirroredLight::make(scene, Lights(scene), use) != nullptr;
   };
-  const std::string metal = conductor("gloss", 0.05);
+  const std::string metal = conductor("gloss", 0.1);
   const std::string coat =
-      "<bsdf type=\"roughplastic\"><float name=\"alpha\" value=\"0.05\"/></bsdf>";
+      "<bsdf type=\"roughplastic\"><float name=\"alpha\" value=\"0.1\"/></bsdf>";
   EXPECT_TRUE(images(metal, MirroredLight::Use::kImage));
   EXPECT_FALSE(images(coat, MirroredLight::Use::kImage));
   EXPECT_TRUE(images(coat, MirroredLight::Use::kDerivatives));
