@@ -29,18 +29,18 @@ constexpr double kApart = 0.1;  // two of a pair, over an edge
 constexpr double kInPlane = 0x1p-20;
 // Flat parts that get this share of the light of another are as bright as it.
 constexpr double kAlike = 0.9;
-// The most that the middle of a flank is over the horizon [rad], how many times as far the middle
-// of the highlight may be from there, and the least part of a highlight that is worth it.
+// A flank's middle rises at most this far over the horizon [rad], the highlight's middle is at most
+// so many times as far from it, and fainter flanks than this part of a highlight are not drawn.
 constexpr double kMostRise = 0.5;
 constexpr double kFarthest = 4;
 constexpr double kLeastSeen = 1e-3;
 // The least angle of a cone of directions [rad]: those within narrower ones are lost by rounding.
 constexpr double kLeastCone = 1e-6;
 
-// Of noise(): to draw highlights with less makes no image less noisy, and takes a tenth to a half
-// more time; those with twice as much are drawn in full, others in part. In six furnished rooms it
-// was up to .041, in the demo .017; .16 in scenes/sharp_shadow.xml, where they take away two thirds
-// of the variance.
+// The least noise() of highlights that images draw. Fainter ones cost 10 to 50 % more time and made
+// no image less noisy; those with twice as much are drawn in full, those between in part. It was up
+// to .041 in six furnished rooms, .017 in the demo and .16 in scenes/sharp_shadow.xml, where
+// drawing them takes away two thirds of the variance.
 constexpr double kLeastNoise = 0.042;
 
 // Any two unit vectors that are orthogonal to n and to each other.

@@ -81,7 +81,7 @@ inline void PathTracer<S, Visitor>::fetch_corners(const Walk& walk) const {
   }
 }
 
-// The same of what textures hold where paths will scatter.
+// Brings the texels into the cache that paths read where they will scatter.
 template <class S, class Visitor>
 inline void PathTracer<S, Visitor>::fetch_textures(std::span<Walk* const> walks) const {
   for (const Walk* const walk : walks) {

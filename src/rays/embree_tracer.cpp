@@ -304,7 +304,7 @@ class EmbreeTracer final : public RayTracer {
     errors_.check();
     rtcSetSceneFlags(made.get(),
                      static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | kFilterOfQuery));
-    // What serves one time alone must be built soon.
+    // A moving scene is traced at one time only: building quickly counts more.
     rtcSetSceneBuildQuality(made.get(),
                             is_moving(scene_) ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH);
     return made;
@@ -314,8 +314,8 @@ class EmbreeTracer final : public RayTracer {
     parallel_for(1, threads, [&](size_t) { rtcJoinCommitScene(rtc_scene); });
     errors_.check();
   }
-  // Slivers that lie askew get coordinates along their sides: a ray may meet the axis-aligned boxes
-  // of all faces of a cylinder.
+  // Slivers that lie askew get coordinates along their sides. Otherwise a ray may meet the
+  // axis-aligned boxes of all faces of a cylinder.
   void attach(const Mesh& mesh, ShapeId id, int threads) {
     const auto frame = frame_of(mesh);
     if (!frame) {

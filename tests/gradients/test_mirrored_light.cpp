@@ -670,7 +670,7 @@ TEST(MirroredLight, IsNotWhereNothingMirrors) {
   EXPECT_EQ(mirrored->mixture(at.surface, scattering).share, 0);
 }
 
-// Of a dielectric's coat little comes back; an image does without it, derivatives do not.
+// A dielectric coat reflects little light: images do not draw its highlights, derivatives do.
 TEST(MirroredLight, ImagesAreSparedFaintHighlights) {
   const TempFiles files;
   const auto images = [&](const std::string& gloss, MirroredLight::Use use) {

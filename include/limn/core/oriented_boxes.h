@@ -17,7 +17,7 @@ struct OrientedBox {
   Vec3d half;                 // half of its size along each axis
 };
 
-// The same box; axes of the world.
+// A box along the axes of the world in this form.
 OrientedBox oriented(const Bounds& bounds);
 
 // True if a plane along two axes of one box, or along the first axis of each, separates them. It
@@ -25,8 +25,8 @@ OrientedBox oriented(const Bounds& bounds);
 bool are_apart(const OrientedBox& a, const OrientedBox& b);
 
 // The box around faces, `margin` larger on every side, along the longest side and the normal of the
-// first, if it has at most a quarter of the area of `aligned`. margin: above the rounding of
-// doubles. There must be a face; it may lack area.
+// first, if it has at most a quarter of the area of `aligned`. margin must exceed the rounding of
+// doubles. There must be a face; its area may be zero.
 std::optional<OrientedBox> thin_box(std::span<const FaceCorners> faces, double margin,
                                     const Bounds& aligned);
 

@@ -131,7 +131,7 @@ struct PathsCheck {
   bool is_zero() const { return error == 0 && gradient_sum == 0 && difference_sum == 0; }
   static constexpr double kMostError = 1e-3;  // an error of a derivative is hardly ever smaller
 };
-// step: 0 for the second best of three: one alone may agree by chance. InputError where edges or
+// step: 0 for the second best of four: one alone may agree by chance. InputError where edges or
 // times move.
 PathsCheck check_paths(const Scene& scene, const std::string& parameter, double step,
                        const RunSettings& settings);
