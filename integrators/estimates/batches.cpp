@@ -39,7 +39,14 @@ Rng key_of(const SampleEstimator& estimator, const Batch& batch, uint64_t pixel,
   return {batch.seed, pixel, static_cast<uint64_t>(s)};
 }
 Rng pixel_key(const SampleEstimator& estimator, const Batch& batch, const PixelSample& at) {
-  const uint64_t pixel = static_cast<uint64_t>(at.y) * estimator.scene().camera.width + at.x;
+  const Camera& camera = estimator.scene().camera;
+  uint64_t pixel = static_cast<uint64_t>(at.y) * camera.width + at.x;
+  if (at.x < 0 || at.y < 0 || at.x >= camera.width || at.y >= camera.height) {
+    // Around the film, see sampled_film: numbers that no pixel has.
+    constexpr int kMost = SharedPlace::kMostReach;
+    const uint64_t row = at.y + kMost;
+    pixel = UINT64_MAX - 1 - (row * (camera.width + 2 * kMost) + at.x + kMost);
+  }
   return key_of(estimator, batch, pixel, at.s);
 }
 // Null where samples serve their own pixels alone.
@@ -50,6 +57,18 @@ const SharingEstimator* sharing_of(const SampleEstimator& estimator) {
 SharedPlace shared_place(const SharingEstimator& estimator, const Batch& batch, int64_t s) {
   return {estimator.scene().film.filter, estimator.reach(),
           key_of(estimator, batch, UINT64_MAX, s)};
+}
+
+// The pixels that have samples: with sample_border, all around the film that serve pixels of it.
+Film sampled_film(const SampleEstimator& estimator) {
+  Film film = estimator.scene().film;
+  const SharingEstimator* sharing = sharing_of(estimator);
+  if (!sharing || !film.sample_border) return film;
+  film.crop_x -= sharing->reach();
+  film.crop_y -= sharing->reach();
+  film.crop_width += 2 * sharing->reach();
+  film.crop_height += 2 * sharing->reach();
+  return film;
 }
 
 // The part of the film that samples of a tile add to.
@@ -94,7 +113,7 @@ class BatchRunner {
 
  private:
   void run_pixels() {
-    const std::vector<Tile> tiles = make_tiles(film_);
+    const std::vector<Tile> tiles = make_tiles(sampled_film(estimator_));
     std::vector<std::vector<TermCost>> costs(tiles.size());
     std::vector<NonFinite> bad(tiles.size());
     std::vector<BatchSums> parts(sharing_ ? tiles.size() : 0);  // they overlap
@@ -358,7 +377,7 @@ size_t steps_per_sample(Estimators estimators) {
   size_t steps = 0;
   for (const auto& estimator : estimators) {
     steps += 1;
-    if (estimator->samples_pixels()) steps += make_tiles(estimator->scene().film).size();
+    if (estimator->samples_pixels()) steps += make_tiles(sampled_film(*estimator)).size();
   }
   return steps;
 }

@@ -25,7 +25,7 @@ double place(const Filter& filter, int reach, double u, Weights& weights) {
 }  // namespace
 
 int SharedPlace::reach_of(const Film& film) {
-  if (film.filter.kind == Filter::Kind::kBox || film.sample_border) return 0;
+  if (film.filter.kind == Filter::Kind::kBox) return 0;
   const double reach = std::floor(film.filter.radius + 0.5);
   return reach <= kMostReach ? static_cast<int>(reach) : 0;
 }

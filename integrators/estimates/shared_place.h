@@ -5,7 +5,8 @@
 // a place d in a pixel, of density S(d) = sum_m f(d + m) along each axis; given d, f(d + m) / S(d)
 // draws m. Here d alone is drawn, and all m are taken with these weights. So an image has the same
 // expectation, and less variance, as nothing is left of the choice of m. The weights add up to 1:
-// a constant has no error. Pixels whose filters the film's border cuts have samples of their own.
+// a constant has no error. Pixels whose filters the film's border cuts have samples of their own;
+// with sample_border there are none, and pixels around the film have samples that serve it.
 #include <array>
 #include <span>
 
@@ -19,7 +20,7 @@ struct SharedPlace {
   static constexpr int kMostSide = 2 * kMostReach + 1;
 
   // How many pixels from its own a sample may serve on every side: 0 if it serves its own alone, as
-  // with box filters, and with sample_border, which needs samples outside the film.
+  // with box filters.
   static int reach_of(const Film& film);
 
   // key: of this sample of all pixels.

@@ -138,15 +138,18 @@ void RadianceEstimator::add_shared(std::span<const KeyedSample> samples,
 void RadianceEstimator::add_footprint(const PixelSample& at, Footprint& sums,
                                       SampleSink& sink) const {
   const Film& film = scene_.film;
-  // Those that are whole are a rectangle of the film.
-  const bool all =
-      is_whole(film, at.x - reach_, at.y - reach_) && is_whole(film, at.x + reach_, at.y + reach_);
+  const auto served = [&](int x, int y) {
+    return x >= film.crop_x && y >= film.crop_y && x < film.crop_x + film.crop_width &&
+           y < film.crop_y + film.crop_height && is_whole(film, x, y);
+  };
+  // These are a rectangle of the film.
+  const bool all = served(at.x - reach_, at.y - reach_) && served(at.x + reach_, at.y + reach_);
   size_t k = 0;
   for (int row = -reach_; row <= reach_; ++row) {
     const int y = at.y - row;
     for (int column = -reach_; column <= reach_; ++column, ++k) {
       const int x = at.x - column;
-      if (all || is_whole(film, x, y)) {
+      if (all || served(x, y)) {
         sink.add_radiance({x, y, at.s}, {sums[0][k], sums[1][k], sums[2][k]}, 1);
       }
       for (auto& sum : sums) sum[k] = 0;

@@ -16,7 +16,7 @@ struct IntegratorType {
   const char* name;
   int max_depth = -1;                       // if absent
   bool is_depth_fixed = false;              // max_depth cannot be given
-  bool passes_null = false;                 // volumetric, see check_null
+  bool is_volumetric = false;               // see check_null
   bool is_wrapper = false;                  // its first nested integrator decides
   std::vector<std::string> ignored = {};    // parameters that change no expectation
   std::vector<std::string> unwritten = {};  // parameters that ask for images that limn lacks
@@ -132,7 +132,14 @@ void read_integrator(const ObjectDescription& object, const SceneDescription& de
   scene.hide_emitters = p.boolean("hide_emitters", false);
   for (const std::string& name : type->ignored) p.has(name);
   p.check_all_used();
-  if (type->passes_null) check_null(description, object.type, scene);
+  if (!type->is_volumetric) return;
+  if (!description.media.empty()) {
+    throw InputError(description.media.front(),
+                     object.type +
+                         " sees media, and limn has no volumes: change the integrator to "
+                         "path, which ignores them");
+  }
+  check_null(description, object.type, scene);
 }
 
 }  // namespace limn

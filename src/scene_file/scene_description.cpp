@@ -16,6 +16,9 @@ const std::vector<std::string> kObjectTags = {"bsdf",     "emitter", "film",   "
                                               "rfilter",  "sampler", "sensor", "shape",
                                               "spectrum", "texture"};
 
+// Of shapes and sensors. Read by name alone, for integrators that ignore it.
+constexpr char kMedium[] = "medium";
+
 constexpr size_t kMaxAliases = 64;  // in a chain of aliases; not tuned
 
 bool contains(const std::vector<std::string>& words, const std::string& word) {
@@ -72,6 +75,8 @@ class Describer {
       add_alias(element);
     } else if (element.name == "ref") {
       root_references_.push_back(reference_of(element));
+    } else if (element.name == kMedium) {
+      describe_object(element);
     } else if (contains(kObjectTags, element.name)) {
       scene_.objects.push_back(describe_object(element));
     } else if (is_property_tag(element.name)) {
@@ -128,6 +133,7 @@ class Describer {
       object->id = id->value;
     }
     all_objects_.push_back(object);
+    if (element.name == kMedium) return object;
     for (const XmlElement& child : element.children) {
       if (!read(child, [&] { add_to_object(child, *object); })) object->failed = true;
     }
@@ -167,7 +173,7 @@ class Describer {
       object.children.push_back({nullptr, id.value, id.where, name_of(element)});
     } else if (is_property_tag(element.name) && !is_object(element)) {
       add_property(element, object);
-    } else if (contains(kObjectTags, element.name)) {
+    } else if (element.name == kMedium || contains(kObjectTags, element.name)) {
       object.children.push_back({describe_object(element), "", element.where, name_of(element)});
     } else {
       std::vector<std::string> known = kObjectTags;
@@ -235,7 +241,12 @@ class Describer {
       const auto look = [&] { child.object = find(child.reference, child.where); };
       if (!errors_.keep(look)) object.failed = true;
     }
-    std::erase_if(object.children, [](const ChildDescription& child) { return !child.object; });
+    std::erase_if(object.children, [&](const ChildDescription& child) {
+      if (!child.object) return true;
+      if (child.object->tag != kMedium) return false;
+      scene_.media.push_back(child.where);
+      return true;
+    });
   }
 
   ErrorList& errors_;

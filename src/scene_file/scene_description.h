@@ -50,6 +50,7 @@ struct SceneDescription {
   std::vector<std::shared_ptr<ObjectDescription>> objects;  // directly under <scene>, in order
   std::vector<std::shared_ptr<ObjectDescription>> with_id;  // every object that has one, in order
   std::vector<std::string> search_path;
+  std::vector<SourceLocation> media;  // of shapes and sensors, which are not described
   std::vector<std::string> warnings;
   std::vector<std::string> files;  // the scene file and what it includes
 };

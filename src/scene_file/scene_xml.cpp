@@ -67,6 +67,12 @@ class SceneBuilder {
     }
     use_sensor(scene_, "0");
     add_exposure();
+    if (const auto& media = description_.media; !media.empty()) {
+      warnings_.push_back(format_warning(
+          media.front(), fmt::format("the media of shapes and sensors are ignored, as by Mitsuba's "
+                                     "path: {} from here on",
+                                     media.size())));
+    }
     if (&warnings_ != &unread_warnings_) warn_of_overlaps(scene_, warnings_);
     return std::move(scene_);
   }
@@ -556,21 +562,28 @@ class SceneBuilder {
   const ObjectDescription* environment_ = nullptr;
 };
 
-// A text without its numbers, and these: warnings of a kind differ in place and numbers alone.
-std::pair<std::string, std::string> kind_and_numbers(const std::string& text) {
-  std::string kind, numbers;
-  bool in_number = false, in_name = false;
-  for (const char c : text) {
-    if (c == '"') in_name = !in_name;
-    const bool is_digit = !in_name && c >= '0' && c <= '9';
-    in_number = is_digit || (in_number && c == '.');
-    if (is_digit && (kind.empty() || kind.back() != '#')) {
-      numbers += numbers.empty() ? "" : ", ";
-      kind += '#';
+// A text without its numbers and quoted names, and these, each once: warnings of a kind differ in
+// place, numbers and names alone.
+std::pair<std::string, std::string> kind_and_details(const std::string& text) {
+  std::string kind;
+  std::vector<std::string> details;
+  for (size_t i = 0; i < text.size();) {
+    size_t end = i;
+    if (text[i] == '"') {
+      end = std::min(text.find('"', i + 1), text.size() - 1) + 1;
+    } else if (std::isdigit(static_cast<unsigned char>(text[i]))) {
+      end = std::min(text.find_first_not_of("0123456789.", i), text.size());
     }
-    (in_number ? numbers : kind) += c;
+    if (end == i) {
+      kind += text[i++];
+      continue;
+    }
+    kind += text[i] == '"' ? "\"\"" : "#";
+    const std::string detail = text.substr(i, end - i);
+    if (std::ranges::find(details, detail) == details.end()) details.push_back(detail);
+    i = end;
   }
-  return {kind, numbers};
+  return {kind, fmt::format("{}", fmt::join(details, ", "))};
 }
 
 // From the third of a kind on, warnings become one that lists their places.
@@ -580,7 +593,7 @@ void shorten(std::vector<std::string>& warnings) {
   for (size_t i = 0; i < warnings.size(); ++i) {
     const size_t mark = warnings[i].find(kMark);
     if (mark != std::string::npos)
-      kinds[kind_and_numbers(warnings[i].substr(mark)).first].push_back(i);
+      kinds[kind_and_details(warnings[i].substr(mark)).first].push_back(i);
   }
   for (const auto& [kind, members] : kinds) {
     if (members.size() < 4) continue;
@@ -592,8 +605,8 @@ void shorten(std::vector<std::string>& warnings) {
                        fmt::format("like that of {}, {} more: ", place(1), members.size() - 2);
     for (size_t k = 2; k < members.size(); ++k) {
       const std::string& text = warnings[members[k]];
-      const std::string numbers = kind_and_numbers(text.substr(text.find(kMark))).second;
-      list += (k > 2 ? ", " : "") + place(k) + (numbers.empty() ? "" : " (" + numbers + ")");
+      const std::string details = kind_and_details(text.substr(text.find(kMark))).second;
+      list += (k > 2 ? ", " : "") + place(k) + (details.empty() ? "" : " (" + details + ")");
     }
     for (size_t k = 3; k < members.size(); ++k) warnings[members[k]].clear();
     warnings[members[2]] = list;

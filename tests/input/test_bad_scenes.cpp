@@ -132,7 +132,7 @@ TEST(BadScene, IndependentMistakesAreReportedTogether) {
       "<shape type=\"ply\"><string name=\"filename\" value=\"a.ply\"/></shape>\n"
       "<shape type=\"sphere\"><float name=\"radius\" value=\"$r\"/><ref id=\"steel\"/></shape>\n"
       "<bsdf type=\"mask\"><ref id=\"wood\"/><bsdf type=\"fur\"/><bsdf type=\"silk\"/></bsdf>\n"
-      "<medium type=\"fog\"/>");
+      "<volume type=\"fog\"/>");
   std::string message = message_of(files, content, {{"q", "1"}, {"s", "2"}});
   for (size_t at; (at = message.find(" (")) != message.npos;) {
     message.erase(at, message.find(')', at) + 1 - at);
@@ -141,7 +141,7 @@ TEST(BadScene, IndependentMistakesAreReportedTogether) {
             "@/s.xml:6:43: error: undefined parameter \"$r\"\n"
             "@/s.xml: error: -D q=1: the scene has no parameter \"$q\"\n"
             "@/s.xml: error: -D s=2: the scene has no parameter \"$s\"\n"
-            "@/s.xml:8:1: error: <scene>: unknown element <medium>; limn has no volumes\n"
+            "@/s.xml:8:1: error: <scene>: unknown element <volume>; limn has no volumes\n"
             "@/s.xml:6:60: error: there is no object with the id \"steel\"\n"
             "@/s.xml:7:24: error: there is no object with the id \"wood\"\n"
             "@/s.xml:4:1: error: unknown bsdf type \"hair\"\n"
@@ -180,7 +180,7 @@ TEST(BadScene, WhatFollowsFromAMistakeIsNotReported) {
        "<bsdf type=\"twosided\"><ref id=\"a\"/></bsdf><alias id=\"a\" as=\"b\"/>"
        "<shape type=\"cube\"><ref id=\"b\"/></shape>",
        "3:1: error: unknown bsdf type"},
-      {"<medium type=\"fog\" id=\"a\"><bsdf type=\"diffuse\" id=\"b\"/></medium>"
+      {"<volume type=\"fog\" id=\"a\"><bsdf type=\"diffuse\" id=\"b\"/></volume>"
        "<shape type=\"cube\"><ref id=\"a\"/></shape><shape type=\"cube\"><ref id=\"b\"/></shape>",
        "3:1: error: <scene>: unknown element"},
       {"<shape type=\"cube\"><ref id=\"a\"/></shape><shape type=\"cube\"><ref id=\"a\"/></shape>",

@@ -53,6 +53,22 @@ TEST(OtherScenes, IntegratorsThatEstimateTheSame) {
   EXPECT_EQ(warnings, std::vector<std::string>{"string:2:24: warning: aovs are not written"});
 }
 
+TEST(OtherScenes, PathIgnoresMedia) {
+  const std::string fog =
+      "<medium type=\"homogeneous\" id=\"fog\"><rgb name=\"sigma_t\" value=\"1 2 3\"/></medium>\n";
+  const std::string ball = "<shape type=\"sphere\"><ref name=\"interior\" id=\"fog\"/></shape>\n";
+  std::vector<std::string> warnings;
+  const std::string other = "<shape type=\"cube\"><ref name=\"interior\" id=\"fog\"/></shape>\n";
+  EXPECT_EQ(read(fog + ball + other, &warnings).shapes.size(), 2u);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_EQ(warnings[0],
+            "string:3:43: warning: the media of shapes and sensors are ignored, as by Mitsuba's "
+            "path: 2 from here on");
+  EXPECT_EQ(read(fog + "<integrator type=\"volpath\"/>").shapes.size(), 0u);  // of no shape
+  EXPECT_NE(message_of("<integrator type=\"prbvolpath\"/>" + fog + ball).find("sees media"),
+            std::string::npos);
+}
+
 // Where both have the same expectation.
 TEST(OtherScenes, VolpathWithWhatItPasses) {
   const std::string net = "<bsdf id=\"a\" type=\"mask\"><bsdf type=\"diffuse\"/></bsdf>";
