@@ -1,6 +1,7 @@
 #pragma once
 // Properties of a described object.
 #include <functional>
+#include <map>
 #include <set>
 
 #include "limn/core/properties.h"
@@ -14,7 +15,8 @@ namespace limn {
 struct Makers {
   std::function<std::shared_ptr<Bsdf>(const ObjectDescription&)> bsdf;
   std::function<std::shared_ptr<Texture>(const ObjectDescription&)> texture;
-  double smooth_as = 0;  // see Properties
+  double smooth_as = 0;                                               // see Properties
+  mutable std::map<std::string, std::shared_ptr<const void>> shared;  // the same
 };
 
 class DescribedProperties final : public Properties {
@@ -40,6 +42,9 @@ class DescribedProperties final : public Properties {
   Rgb<double> rgb(const std::string& name, const Rgb<double>& absent) override;
   Matrix4 transform(const std::string& name) override;
   std::string file(const std::string& name) override;
+  std::shared_ptr<const void>& shared(const std::string& name) override {
+    return make_nested_.shared[name];
+  }
   std::shared_ptr<Texture> texture(const std::string& name) override;
   std::shared_ptr<Texture> only_texture() override;
   std::vector<std::shared_ptr<Bsdf>> bsdfs() override;

@@ -37,7 +37,8 @@ class SceneBuilder {
         warnings_(warnings ? *warnings : unread_warnings_),
         make_nested_{[this](const ObjectDescription& object) { return bsdf(object); },
                      [this](const ObjectDescription& object) { return texture(object); },
-                     smooth_as} {}
+                     smooth_as,
+                     {}} {}
 
   Scene build() {
     scene_.file = description_.file;

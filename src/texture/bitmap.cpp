@@ -212,10 +212,17 @@ std::shared_ptr<Texture> read_bitmap(Properties& properties) {
   // These choose how texels are stored: here, always as their file has them.
   read_choice(properties, "format", {"auto", "variant", "float16", "fp16", "uint8"});
   properties.boolean("accel", true);
-  StoredImage image = read_stored_image(settings.file);
-  check_finite(image, settings.file, "the texture");
-  if (properties.boolean("raw", false)) image.srgb = false;
-  return std::make_shared<Bitmap>(std::make_shared<Texels>(image), std::move(settings));
+  const bool raw = properties.boolean("raw", false);
+  std::shared_ptr<const void>& texels =
+      properties.shared(settings.file + (raw ? " (raw texels)" : " (texels)"));
+  if (!texels) {
+    StoredImage image = read_stored_image(settings.file);
+    check_finite(image, settings.file, "the texture");
+    if (raw) image.srgb = false;
+    texels = std::make_shared<Texels>(image);
+  }
+  return std::make_shared<Bitmap>(std::static_pointer_cast<const Texels>(texels),
+                                  std::move(settings));
 }
 
 }  // namespace limn

@@ -53,6 +53,7 @@ class TestProperties final : public Properties {
   }
   Matrix4 transform(const std::string& name) override { return get(name, Matrix4{}); }
   std::string file(const std::string& name) override { return get(name, std::string{}); }
+  std::shared_ptr<const void>& shared(const std::string& name) override { return of_files[name]; }
   std::shared_ptr<Texture> texture(const std::string& name) override {
     const auto found = textures.find(name);
     return found == textures.end() ? nullptr : found->second;
@@ -65,6 +66,7 @@ class TestProperties final : public Properties {
 
   std::map<std::string, std::shared_ptr<Texture>> textures;
   double roughness = 0;  // see smooth_as
+  std::map<std::string, std::shared_ptr<const void>> of_files;
 
  private:
   template <class T>

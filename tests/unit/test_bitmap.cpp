@@ -10,6 +10,7 @@
 #include "limn/core/scene.h"
 #include "src/texture/texels.h"
 #include "support/temp_files.h"
+#include "support/test_properties.h"
 
 namespace limn {
 namespace {
@@ -113,6 +114,29 @@ TEST(Bitmap, EightBitsAreSrgb) {
   EXPECT_NEAR(red_at(scene.shapes[0].bsdf->texture(0), 0.5, 0.75), (0.1274377 + 1) / 2, 1e-7);
   const Scene raw = read(bitmap(png, "<boolean name=\"raw\" value=\"true\"/>"));
   EXPECT_NEAR(red_at(raw.shapes[0].bsdf->texture(0), 0.5, 0.25), 25 / 255.0, 1e-7);
+}
+
+// What comes out of one file is shared, raw texels apart from others.
+TEST(Bitmap, ASceneReadsAFileOnce) {
+  const TempFiles files;
+  const auto png = std::filesystem::path(LIMN_SOURCE_DIR) / "tests/fuzz/corpus/png/grey_alpha.png";
+  std::filesystem::copy_file(png, files.path("map"));
+  std::map<std::string, std::shared_ptr<const void>> of_files;
+  const auto red = [&](bool raw) {
+    test::TestProperties properties("texture", "bitmap",
+                                    {{"filename", files.path("map")}, {"raw", raw}});
+    properties.of_files.swap(of_files);
+    const double value = red_at(*make_texture(properties), 0.5, 0.25);
+    properties.of_files.swap(of_files);
+    return value;
+  };
+  EXPECT_NEAR(red(false), 0.0318960 / 2, 1e-7);
+  EXPECT_NEAR(red(true), 25 / 255.0, 1e-7);
+  std::filesystem::copy_file(two_by_two(files), files.path("map"),
+                             std::filesystem::copy_options::overwrite_existing);
+  EXPECT_NEAR(red(false), 0.0318960 / 2, 1e-7);
+  of_files.clear();
+  EXPECT_EQ(red(false), 0.5);
 }
 
 TEST(Bitmap, TexelsStayAsTheyAreStored) {

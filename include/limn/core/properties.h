@@ -49,6 +49,8 @@ class Properties {
   // A file name resolved against the search path. InputError if the property is absent or no such
   // file exists.
   virtual std::string file(const std::string& name) = 0;
+  // What objects of the scene share of a file, by a name for both; null until one of them sets it.
+  virtual std::shared_ptr<const void>& shared(const std::string& name) = 0;
   // The nested texture (or reference to one) of this name, made anew; null if there is none.
   virtual std::shared_ptr<Texture> texture(const std::string& name) = 0;
   // The only nested texture, of any name; null if there is none. InputError if there are several.
