@@ -1,4 +1,4 @@
-// Places of samples that all pixels share, by the filter's quantiles.
+// Places of samples that all pixels share, by the quantiles of their density.
 #include "integrators/estimates/shared_place.h"
 
 #include <cmath>
@@ -8,11 +8,19 @@ namespace {
 
 using Weights = std::array<double, SharedPlace::kMostSide>;
 
-// Returns the place in the pixel for the fraction u of the filter. weights[reach + m]: of the pixel
-// m before it.
+// Returns the place in the pixel below which the fraction u of S lies, so that numbers which are
+// spread evenly give places that are. weights[reach + m]: of the pixel m before it.
 double place(const Filter& filter, int reach, double u, Weights& weights) {
-  const double from_corner = 0.5 + filter.quantile(-filter.radius, filter.radius, u);
-  const double inside = from_corner - std::floor(from_corner);
+  const auto below = [&](double inside) {
+    double sum = 0;
+    for (int m = -reach; m <= reach; ++m) sum += filter.integral(inside - 0.5 + m);
+    return sum;
+  };
+  const double first = below(0), sought = first + u * (below(1) - first);
+  double inside = 0;
+  for (double step = 0.5; step > 0x1p-54; step *= 0.5) {
+    if (below(inside + step) <= sought) inside += step;
+  }
   weights = {};
   double sum = 0;
   for (int m = -reach; m <= reach; ++m) {

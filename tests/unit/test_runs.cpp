@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <bit>
+#include <map>
 
 #include "integrators/estimates/checksum.h"
 #include "integrators/estimates/shared_place.h"
@@ -397,6 +398,23 @@ TEST(SharedPlaces, HaveTheWeightsOfTheFilter) {
       exact.push_back(share(k / side - reach) * share(k % side - reach));
     }
     EXPECT_TRUE(compare_moments(moments, exact).p_largest >= 1e-5);
+  }
+}
+
+// Numbers that are spread evenly give places that are; a tent of radius 1, the numbers themselves.
+TEST(SharedPlaces, AreInTheOrderOfNumbers) {
+  Filter filter;
+  std::map<double, double> places;  // by number
+  for (uint64_t s = 0; s < 1000; ++s) {
+    const Rng key(1, 2, s);
+    const double u = key.at(Purpose::kFilm, 0).uniform();
+    places[u] = SharedPlace(filter, 2, key).x;
+    EXPECT_NEAR(SharedPlace({Filter::Kind::kTent, 1}, 1, key).x, u, 1e-14);
+  }
+  double before = 0;
+  for (const auto& [u, place] : places) {
+    EXPECT_LT(before, place) << u;
+    before = place;
   }
 }
 
