@@ -1,7 +1,6 @@
 #pragma once
 // Dual boxes: bounds of a set of edges in the space of planes.
 #include <array>
-#include <cstdint>
 #include <span>
 
 #include "edgetree/bounds/forest_config.h"

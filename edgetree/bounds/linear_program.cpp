@@ -1,5 +1,5 @@
 // Linear programs with CLP; the only file that includes it.
-#include "edgetree/bounds/linear_program.h"
+#include "edgetree/bounds/normaliser.h"
 
 #include <array>
 #include <coin/ClpSimplex.hpp>

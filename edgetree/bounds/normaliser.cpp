@@ -7,8 +7,6 @@
 #include <cmath>
 #include <optional>
 
-#include "edgetree/bounds/linear_program.h"
-
 namespace limn {
 namespace {
 

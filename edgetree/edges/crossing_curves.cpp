@@ -176,6 +176,31 @@ Vec3d normal_of(const Mesh& mesh, FaceId id) {
   return cross(cast<double>(mesh.positions[j]) - a, cast<double>(mesh.positions[k]) - a);
 }
 
+// Appends the intersection line of a segment's faces, without its incident faces.
+void append_line(std::span<const Mesh* const> meshes, const IntersectionSegment& segment,
+                 bool moves, EdgeMesh& edges) {
+  const auto first = static_cast<uint32_t>(edges.positions.size());
+  Edge edge;
+  edge.edge_class = EdgeClass::kIntersection;
+  for (int i = 0; i < 2; ++i) {
+    const Vec3d& x = segment.ends[i];
+    const FaceRef face = segment.faces[i];
+    const Vec3d n = normalize(normal_of(*meshes[face.shape.index()], face.face));
+    edge.vertices[i] = VertexId(first + i);
+    edge.faces[i] = FaceId(first + i);
+    edges.positions.push_back(x);
+    if (moves) edges.tangents.push_back(intersection_velocity(meshes, segment, x));
+    edges.planes.push_back({n, -dot(n, x)});
+    edges.extent = std::max(edges.extent, length(x));
+  }
+  edges.edges.push_back(edge);
+}
+
+template <class Items>
+void append(std::vector<typename Items::value_type>& list, const Items& items) {
+  list.insert(list.end(), items.begin(), items.end());
+}
+
 }  // namespace
 
 std::vector<IntersectionSegment> find_intersections(std::span<const Mesh* const> meshes,
@@ -221,35 +246,6 @@ Vec3<Lanes> intersection_velocity(std::span<const Mesh* const> meshes,
   const auto component = [&](int k) { return speeds[0] * by_first[k] + speeds[1] * by_second[k]; };
   return {component(0), component(1), component(2)};
 }
-
-namespace {
-
-// Appends the intersection line of a segment's faces, without its incident faces.
-void append_line(std::span<const Mesh* const> meshes, const IntersectionSegment& segment,
-                 bool moves, EdgeMesh& edges) {
-  const auto first = static_cast<uint32_t>(edges.positions.size());
-  Edge edge;
-  edge.edge_class = EdgeClass::kIntersection;
-  for (int i = 0; i < 2; ++i) {
-    const Vec3d& x = segment.ends[i];
-    const FaceRef face = segment.faces[i];
-    const Vec3d n = normalize(normal_of(*meshes[face.shape.index()], face.face));
-    edge.vertices[i] = VertexId(first + i);
-    edge.faces[i] = FaceId(first + i);
-    edges.positions.push_back(x);
-    if (moves) edges.tangents.push_back(intersection_velocity(meshes, segment, x));
-    edges.planes.push_back({n, -dot(n, x)});
-    edges.extent = std::max(edges.extent, length(x));
-  }
-  edges.edges.push_back(edge);
-}
-
-template <class Items>
-void append(std::vector<typename Items::value_type>& list, const Items& items) {
-  list.insert(list.end(), items.begin(), items.end());
-}
-
-}  // namespace
 
 EdgeMesh intersection_edges(std::span<const Mesh* const> meshes,
                             std::span<const IntersectionSegment> segments,

@@ -205,6 +205,23 @@ class Builder {
   EdgeMesh result_;
 };
 
+// Candidate or not, if the edge's class decides it; nothing if its faces must be tested.
+std::optional<bool> known_candidate(const EdgeMesh& mesh, const Edge& edge) {
+  if (edge.edge_class == EdgeClass::kBoundary || edge.edge_class == EdgeClass::kIrregular ||
+      edge.edge_class == EdgeClass::kIntersection)
+    return true;
+  const bool seen = edge.edge_class == EdgeClass::kSharp || edge.edge_class == EdgeClass::kTexture;
+  if (seen && !mesh.one_sided_closed) return true;
+  if (edge.edge_class == EdgeClass::kSmooth && edge.concave && mesh.one_sided_closed) return false;
+  return {};
+}
+
+bool is_candidate(EdgeClass edge_class, Facing first, Facing second) {
+  if (edge_class == EdgeClass::kSharp) return first.front || second.front;
+  if (edge_class == EdgeClass::kTexture) return first.front;
+  return (first.front && second.back) || (first.back && second.front);
+}
+
 }  // namespace
 
 const char* edge_class_name(EdgeClass edge_class) {
@@ -234,27 +251,6 @@ Facing facing(const EdgeMesh& mesh, FaceId face, const Vec3d& p) {
   const double d = mesh.plane(face).distance(p);
   return {d >= -error, d <= error};
 }
-
-namespace {
-
-// Candidate or not, if the edge's class decides it; nothing if its faces must be tested.
-std::optional<bool> known_candidate(const EdgeMesh& mesh, const Edge& edge) {
-  if (edge.edge_class == EdgeClass::kBoundary || edge.edge_class == EdgeClass::kIrregular ||
-      edge.edge_class == EdgeClass::kIntersection)
-    return true;
-  const bool seen = edge.edge_class == EdgeClass::kSharp || edge.edge_class == EdgeClass::kTexture;
-  if (seen && !mesh.one_sided_closed) return true;
-  if (edge.edge_class == EdgeClass::kSmooth && edge.concave && mesh.one_sided_closed) return false;
-  return {};
-}
-
-bool is_candidate(EdgeClass edge_class, Facing first, Facing second) {
-  if (edge_class == EdgeClass::kSharp) return first.front || second.front;
-  if (edge_class == EdgeClass::kTexture) return first.front;
-  return (first.front && second.back) || (first.back && second.front);
-}
-
-}  // namespace
 
 bool is_candidate(const EdgeMesh& mesh, EdgeId id, const Vec3d& p) {
   const Edge& edge = mesh.edge(id);

@@ -8,7 +8,6 @@
 #include "edgetree/forest/forest_build.h"
 #include "edgetree/forest/forest_choice.h"
 #include "edgetree/forest/forest_query.h"
-#include "edgetree/forest/forest_rejection.h"
 #include "edgetree/lobe/seen_edge.h"
 #include "limn/core/prefetch.h"
 

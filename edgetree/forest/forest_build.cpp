@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "edgetree/forest/forest_query.h"
-#include "edgetree/forest/forest_split.h"
 #include "limn/core/parallel.h"
 
 namespace limn {
@@ -20,43 +19,6 @@ namespace {
 double truncated(double x) {
   return std::bit_cast<double>(std::bit_cast<uint64_t>(x) & ~((uint64_t{1} << 29) - 1));
 }
-
-}  // namespace
-
-std::optional<ForestGroup> group_of(const EdgeMesh& mesh, const Edge& edge, bool cull_concave) {
-  switch (edge.edge_class) {
-    case EdgeClass::kSmooth:
-    case EdgeClass::kFlat:
-      if (cull_concave && edge.concave && mesh.one_sided_closed) return std::nullopt;
-      return ForestGroup::kSilhouette;
-    case EdgeClass::kSharp:
-      return mesh.one_sided_closed ? ForestGroup::kFront : ForestGroup::kFolds;
-    case EdgeClass::kTexture:
-      return mesh.one_sided_closed ? ForestGroup::kFront : ForestGroup::kAlways;
-    default:
-      return ForestGroup::kAlways;
-  }
-}
-
-Bounds bounds_of(std::span<const Wedge> wedges) {
-  Bounds bounds;
-  for (const Wedge& wedge : wedges)
-    for (const Vec3d& x : wedge.ends) bounds.extend(x);
-  return bounds;
-}
-
-// The cube around the center contains the box: boxes of children are clipped to it.
-NodeFrame frame_of(const Bounds& box) {
-  const Vec3d middle = box.center();
-  const Vec3d center{truncated(middle.x), truncated(middle.y), truncated(middle.z)};
-  double radius = 0.5 * box.diagonal();
-  // Covers the rounding of the center and the diagonal of thin boxes.
-  for (int k = 0; k < 3; ++k)
-    radius = std::max({radius, box.upper[k] - center[k], center[k] - box.lower[k]});
-  return {center, truncated(1 / radius)};
-}
-
-namespace {
 
 double length_of(std::span<const Wedge> wedges) {
   double sum = 0;
@@ -390,6 +352,39 @@ uint32_t append_motion(const EdgeMesh& mesh, const Lanes& lane_scale, Forest& fo
 }
 
 }  // namespace
+
+std::optional<ForestGroup> group_of(const EdgeMesh& mesh, const Edge& edge, bool cull_concave) {
+  switch (edge.edge_class) {
+    case EdgeClass::kSmooth:
+    case EdgeClass::kFlat:
+      if (cull_concave && edge.concave && mesh.one_sided_closed) return std::nullopt;
+      return ForestGroup::kSilhouette;
+    case EdgeClass::kSharp:
+      return mesh.one_sided_closed ? ForestGroup::kFront : ForestGroup::kFolds;
+    case EdgeClass::kTexture:
+      return mesh.one_sided_closed ? ForestGroup::kFront : ForestGroup::kAlways;
+    default:
+      return ForestGroup::kAlways;
+  }
+}
+
+Bounds bounds_of(std::span<const Wedge> wedges) {
+  Bounds bounds;
+  for (const Wedge& wedge : wedges)
+    for (const Vec3d& x : wedge.ends) bounds.extend(x);
+  return bounds;
+}
+
+// The cube around the center contains the box: boxes of children are clipped to it.
+NodeFrame frame_of(const Bounds& box) {
+  const Vec3d middle = box.center();
+  const Vec3d center{truncated(middle.x), truncated(middle.y), truncated(middle.z)};
+  double radius = 0.5 * box.diagonal();
+  // Covers the rounding of the center and the diagonal of thin boxes.
+  for (int k = 0; k < 3; ++k)
+    radius = std::max({radius, box.upper[k] - center[k], center[k] - box.lower[k]});
+  return {center, truncated(1 / radius)};
+}
 
 Forest build_forest(const EdgeSamplerInput& input, int threads, const ForestConfig& config) {
   Forest forest;

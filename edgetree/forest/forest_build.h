@@ -1,16 +1,21 @@
 #pragma once
 // Builds the trees of the edge forest.
 #include <algorithm>
+#include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include "edgetree/bounds/forest_config.h"
 #include "edgetree/bounds/forest_fit.h"
+#include "edgetree/bounds/split_tree.h"
 #include "edgetree/forest/forest_node.h"
 #include "edgetree/forest/wedge_list.h"
+#include "edgetree/simd.h"
 #include "limn/core/bounds.h"
 #include "limn/edgetree/edge_sampler.h"
+#include "limn/edgetree/rejection_tree.h"
 
 namespace limn {
 
@@ -47,5 +52,15 @@ NodeFrame frame_of(const Bounds& box);
 
 // Builds one tree per object and group with edges. The result does not depend on `threads`.
 Forest build_forest(const EdgeSamplerInput& input, int threads, const ForestConfig& config);
+
+// The children of a node are all nodes, or, if it has at most `width` edges, one edge
+// each.
+using ForestShape = SplitTree<kWidth>;
+
+// list: at least one wedge. width: 2 to kWidth.
+ForestShape split_edges(const WedgeList& list, uint32_t width, int threads);
+
+// Its nodes are the children of the forest's nodes. The forest must outlive it.
+std::unique_ptr<RejectionTree> make_forest_rejection_tree(const Forest& forest);
 
 }  // namespace limn

@@ -2,8 +2,6 @@
 // Data of the edge forest: nodes of up to eight children in SIMD vectors. Children of inner nodes
 // are nodes, children of edge nodes are edges.
 #include <cstdint>
-#include <span>
-#include <string>
 #include <vector>
 
 #include "edgetree/forest/forest_motion.h"

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "edgetree/light/radiance_means.h"
+#include "edgetree/light/light_term.h"
 
 namespace limn {
 namespace {

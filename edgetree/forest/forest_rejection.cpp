@@ -1,5 +1,5 @@
 // The edge forest as a RejectionTree.
-#include "edgetree/forest/forest_rejection.h"
+#include "edgetree/forest/forest_build.h"
 
 #include "edgetree/forest/forest_query.h"
 

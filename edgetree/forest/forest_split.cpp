@@ -1,5 +1,5 @@
 // Binned splits of edges by position and direction of normals.
-#include "edgetree/forest/forest_split.h"
+#include "edgetree/forest/forest_build.h"
 
 #include <algorithm>
 #include <array>

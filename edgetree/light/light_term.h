@@ -12,6 +12,7 @@
 
 #include "edgetree/simd.h"
 #include "limn/edgetree/edge_sampler.h"
+#include "limn/edgetree/radiance_pyramid.h"
 
 namespace limn {
 
@@ -66,5 +67,8 @@ class LightCones {
   int count_ = 0;
   float base_ = 0;
 };
+
+// RadiancePyramid::mean element-wise; unspecified where d or the tangent is invalid.
+Floats means(const RadiancePyramid& pyramid, const Floats3& d, Floats tangent);
 
 }  // namespace limn

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "edgetree/light/radiance_means.h"
+#include "edgetree/light/light_term.h"
 
 namespace limn {
 namespace {
@@ -14,6 +14,16 @@ Vec3d octahedral_direction(double u, double v) {
   const double z = 1 - std::fabs(u) - std::fabs(v);
   if (z >= 0) return {u, v, z};
   return {std::copysign(1 - std::fabs(v), u), std::copysign(1 - std::fabs(u), v), z};
+}
+
+Floats with_sign_of(Floats magnitude, Floats sign) {
+  return (Floats)(((Ints)magnitude & INT32_MAX) | ((Ints)sign & INT32_MIN));
+}
+
+Floats gather(const float* texels, Ints index) {
+  Floats result;
+  for (int i = 0; i < kWidth; ++i) result[i] = texels[index[i]];
+  return result;
 }
 
 }  // namespace
@@ -62,20 +72,6 @@ RadiancePyramid::RadiancePyramid(const std::function<double(const Vec3d&)>& lumi
 float RadiancePyramid::mean(float dx, float dy, float dz, float tangent) const {
   return means(*this, {splat(dx), splat(dy), splat(dz)}, splat(tangent))[0];
 }
-
-namespace {
-
-Floats with_sign_of(Floats magnitude, Floats sign) {
-  return (Floats)(((Ints)magnitude & INT32_MAX) | ((Ints)sign & INT32_MIN));
-}
-
-Floats gather(const float* texels, Ints index) {
-  Floats result;
-  for (int i = 0; i < kWidth; ++i) result[i] = texels[index[i]];
-  return result;
-}
-
-}  // namespace
 
 Floats means(const RadiancePyramid& pyramid, const Floats3& d, Floats tangent) {
   // 4^l texels share 4 pi: a texel of level l has the solid angle of a cone of tangent 2 * 2^-l.

@@ -1,13 +1,11 @@
 // Builds the paper's trees per object and group: frames, moments bottom-up, fits, links.
-#include "edgetree/quadric/quadric_build.h"
+#include "edgetree/quadric/quadric_node.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "edgetree/forest/forest_build.h"
-#include "edgetree/quadric/quadric_fit.h"
-#include "edgetree/quadric/quadric_split.h"
 #include "limn/core/parallel.h"
 
 namespace limn {

@@ -1,5 +1,5 @@
 // Fits the dual box and the pair of quadrics of a set of wedges.
-#include "edgetree/quadric/quadric_fit.h"
+#include "edgetree/quadric/quadric_node.h"
 
 #include <Eigen/Dense>
 #include <vector>

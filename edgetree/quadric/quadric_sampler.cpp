@@ -7,7 +7,7 @@
 
 #include "edgetree/forest/choose_root.h"
 #include "edgetree/lobe/seen_edge.h"
-#include "edgetree/quadric/quadric_build.h"
+#include "edgetree/quadric/quadric_node.h"
 #include "edgetree/quadric/quadric_query.h"
 #include "limn/edgetree/quadric_chart.h"
 

@@ -3,7 +3,7 @@
 // from (differences are listed in edgetree/README.md).
 #include <memory>
 
-#include "edgetree/quadric/quadric_config.h"
+#include "edgetree/quadric/quadric_node.h"
 #include "limn/edgetree/edge_sampler.h"
 
 namespace limn {

@@ -1,5 +1,5 @@
 // Splits edges by the surface area heuristic.
-#include "edgetree/quadric/quadric_split.h"
+#include "edgetree/quadric/quadric_node.h"
 
 #include <algorithm>
 #include <array>

@@ -16,6 +16,29 @@ auto moving_corners(const Scene& scene) {
   return [&scene](FaceRef face) { return corner_leaves(scene, face); };
 }
 
+// A point of a face on a clip plane, between two corners.
+Vec3<Var> meet_clip_plane(const CameraView<Var>& camera, const Vec3<Var>& a, const Vec3<Var>& b,
+                          double clip) {
+  const Var depth_a = camera.depth(a), depth_b = camera.depth(b);
+  return a + (b - a) * ((clip - depth_a) / (depth_b - depth_a));
+}
+
+// The point at t of where the face meets the plane, as clip_curves.cpp lists its ends.
+Vec3<Var> clip_point(const Scene& scene, const CameraView<Var>& view, const ClipSegment& segment,
+                     double t) {
+  const Camera& camera = scene.camera;
+  const double clip = segment.at_far_plane ? camera.far_clip : camera.near_clip;
+  const auto corners = corner_leaves(scene, segment.face);
+  Vec3<Var> ends[2];
+  int count = 0;
+  for (int k = 0; k < 3; ++k) {
+    const Vec3<Var>&a = corners[k], &b = corners[(k + 1) % 3];
+    const bool beyond_a = camera.depth(value(a)) > clip, beyond_b = camera.depth(value(b)) > clip;
+    if (beyond_a != beyond_b) ends[count++] = meet_clip_plane(view, a, b, clip);
+  }
+  return ends[0] + (ends[1] - ends[0]) * t;
+}
+
 }  // namespace
 
 bool VertexAdjoint::takes(const BoundaryForm& form, const Rng&) {
@@ -102,33 +125,6 @@ void FilmPointAdjoint::add_line(const FilmLineSample& line, const Rgb<double>& d
   form.add_edge(*line.mesh, line.edge, line.t, g);
   add(difference);
 }
-
-namespace {
-
-// A point of a face on a clip plane, between two corners.
-Vec3<Var> meet_clip_plane(const CameraView<Var>& camera, const Vec3<Var>& a, const Vec3<Var>& b,
-                          double clip) {
-  const Var depth_a = camera.depth(a), depth_b = camera.depth(b);
-  return a + (b - a) * ((clip - depth_a) / (depth_b - depth_a));
-}
-
-// The point at t of where the face meets the plane, as clip_curves.cpp lists its ends.
-Vec3<Var> clip_point(const Scene& scene, const CameraView<Var>& view, const ClipSegment& segment,
-                     double t) {
-  const Camera& camera = scene.camera;
-  const double clip = segment.at_far_plane ? camera.far_clip : camera.near_clip;
-  const auto corners = corner_leaves(scene, segment.face);
-  Vec3<Var> ends[2];
-  int count = 0;
-  for (int k = 0; k < 3; ++k) {
-    const Vec3<Var>&a = corners[k], &b = corners[(k + 1) % 3];
-    const bool beyond_a = camera.depth(value(a)) > clip, beyond_b = camera.depth(value(b)) > clip;
-    if (beyond_a != beyond_b) ends[count++] = meet_clip_plane(view, a, b, clip);
-  }
-  return ends[0] + (ends[1] - ends[0]) * t;
-}
-
-}  // namespace
 
 // The cut moves with the camera and the face: that is easier on the tape.
 void FilmPointAdjoint::add_clip(const FilmLineSample& line, double weight) {

@@ -1,6 +1,5 @@
 #pragma once
 // Reverse mode's sinks of boundary samples: each pushes the points of its sample, and the viewer.
-#include <vector>
 
 #include "integrators/backward/edge_motion.h"
 #include "integrators/backward/film_adjoint.h"

@@ -15,7 +15,6 @@
 #include "limn/core/names.h"
 #include "limn/integrators/methods.h"
 #include "limn/integrators/parts.h"
-#include "limn/integrators/trace_backward.h"
 
 namespace limn {
 

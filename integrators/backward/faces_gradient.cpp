@@ -6,7 +6,7 @@
 #include "integrators/backward/reverse_estimator.h"
 #include "integrators/estimates/contributions.h"
 #include "integrators/methods/faces_estimator.h"
-#include "integrators/methods/selection.h"
+#include "integrators/methods/term_job.h"
 #include "integrators/paths/path_follow.h"
 #include "limn/core/exposure.h"
 

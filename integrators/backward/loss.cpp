@@ -55,44 +55,6 @@ std::vector<double> pixel_weights(const Scene& scene, const Image& mask) {
   return weights;
 }
 
-}  // namespace
-
-void check_loss_images(const Scene& scene, const Image& target, const Image& mask,
-                       const std::string& target_place, const std::string& mask_place) {
-  check_size(scene, target, "target", target_place);
-  const auto place = [&](size_t pixel) {
-    return fmt::format("in column {}, row {}", pixel % target.width, pixel / target.width);
-  };
-  double sum = 0;
-  if (!mask.data.empty()) {
-    check_size(scene, mask, "mask", mask_place);
-    for (size_t i = 0; i < mask.data.size(); i += mask.channels) {
-      const size_t pixel = i / mask.channels;
-      if (!(mask.data[i] >= 0 && std::isfinite(mask.data[i]))) {
-        throw InputError({mask_place}, "the mask is negative or not finite " + place(pixel));
-      }
-      for (int c = 1; c < mask.channels; ++c) {
-        if (mask.data[i + c] == mask.data[i]) continue;
-        throw InputError({mask_place}, "the mask's channels differ " + place(pixel) +
-                                           ": it must have one channel, or three that are alike");
-      }
-      sum += mask.data[i];
-    }
-    if (sum == 0) {
-      throw InputError({mask_place}, "the mask is zero everywhere: no pixel is left for the loss");
-    }
-  }
-  for (size_t i = 0; i < target.data.size(); ++i) {
-    const size_t pixel = i / target.channels;
-    const bool seen = mask.data.empty() || mask.data[pixel * mask.channels] > 0;
-    if (std::isfinite(target.data[i]) || !seen) continue;
-    throw InputError({target_place}, "the target is not finite " + place(pixel) +
-                                         ": a mask that is zero there leaves it out");
-  }
-}
-
-namespace {
-
 // An image pair and its target at one size, and what each pixel weighs.
 struct Level {
   int width, height;
@@ -157,6 +119,40 @@ void check_method(const Method& method) {
 }
 
 }  // namespace
+
+void check_loss_images(const Scene& scene, const Image& target, const Image& mask,
+                       const std::string& target_place, const std::string& mask_place) {
+  check_size(scene, target, "target", target_place);
+  const auto place = [&](size_t pixel) {
+    return fmt::format("in column {}, row {}", pixel % target.width, pixel / target.width);
+  };
+  double sum = 0;
+  if (!mask.data.empty()) {
+    check_size(scene, mask, "mask", mask_place);
+    for (size_t i = 0; i < mask.data.size(); i += mask.channels) {
+      const size_t pixel = i / mask.channels;
+      if (!(mask.data[i] >= 0 && std::isfinite(mask.data[i]))) {
+        throw InputError({mask_place}, "the mask is negative or not finite " + place(pixel));
+      }
+      for (int c = 1; c < mask.channels; ++c) {
+        if (mask.data[i + c] == mask.data[i]) continue;
+        throw InputError({mask_place}, "the mask's channels differ " + place(pixel) +
+                                           ": it must have one channel, or three that are alike");
+      }
+      sum += mask.data[i];
+    }
+    if (sum == 0) {
+      throw InputError({mask_place}, "the mask is zero everywhere: no pixel is left for the loss");
+    }
+  }
+  for (size_t i = 0; i < target.data.size(); ++i) {
+    const size_t pixel = i / target.channels;
+    const bool seen = mask.data.empty() || mask.data[pixel * mask.channels] > 0;
+    if (std::isfinite(target.data[i]) || !seen) continue;
+    throw InputError({target_place}, "the target is not finite " + place(pixel) +
+                                         ": a mask that is zero there leaves it out");
+  }
+}
 
 Method loss_method(const Method& backward) {
   return backward->closed_light ? backward : Method(Task::kImage);

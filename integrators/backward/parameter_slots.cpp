@@ -8,7 +8,7 @@
 #include "limn/core/check.h"
 #include "limn/core/error.h"
 #include "limn/core/exposure.h"
-#include "limn/core/moved.h"
+#include "limn/core/parameter.h"
 #include "limn/core/tangent.h"
 
 namespace limn {
@@ -23,24 +23,6 @@ bool moves_unknown(const Scene& scene, const Parameter& parameter) {
   }
   return true;
 }
-
-}  // namespace
-
-std::vector<Parameter> reverse_parameters(const Scene& scene, const BackwardOptions& options) {
-  if (!options.found.empty()) return options.found;
-  std::vector<Parameter> parameters;
-  if (options.parameters.empty()) {
-    parameters = list_parameters(scene);
-    std::erase_if(parameters,
-                  [&](const Parameter& p) { return p.repeats || moves_unknown(scene, p); });
-    return parameters;
-  }
-  for (const std::string& name : options.parameters)
-    parameters.push_back(find_parameter_or_array(scene, name));
-  return parameters;
-}
-
-namespace {
 
 // The object among a BSDF and those inside it that acts on one side; null if that is black.
 std::shared_ptr<Bsdf> object_of(const std::shared_ptr<Bsdf>& bsdf, const Bsdf* side) {
@@ -108,6 +90,20 @@ SeededCopies<T> seeded_copies(const T& object, const std::vector<ChannelSlots>& 
 }
 
 }  // namespace
+
+std::vector<Parameter> reverse_parameters(const Scene& scene, const BackwardOptions& options) {
+  if (!options.found.empty()) return options.found;
+  std::vector<Parameter> parameters;
+  if (options.parameters.empty()) {
+    parameters = list_parameters(scene);
+    std::erase_if(parameters,
+                  [&](const Parameter& p) { return p.repeats || moves_unknown(scene, p); });
+    return parameters;
+  }
+  for (const std::string& name : options.parameters)
+    parameters.push_back(find_parameter_or_array(scene, name));
+  return parameters;
+}
 
 // The values of a scene that a parameter may move, in an order that all copies share.
 class ParameterSlots::Values {

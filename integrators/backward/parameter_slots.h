@@ -2,7 +2,6 @@
 // From names of parameters to slots of a gradient, and back: which numbers of the scene have a
 // slot, and how the parameters' derivatives follow from those of the slots.
 #include <optional>
-#include <string>
 #include <utility>
 #include <vector>
 

@@ -11,7 +11,7 @@
 #include "integrators/edges/scene_edges.h"
 #include "integrators/edges/texture_discontinuities.h"
 #include "integrators/estimates/contributions.h"
-#include "integrators/methods/selection.h"
+#include "integrators/methods/term_job.h"
 #include "integrators/paths/camera_path.h"
 #include "integrators/paths/chain_light.h"
 #include "integrators/paths/path_follow.h"

@@ -12,7 +12,7 @@
 #include "integrators/estimates/gradient_estimator.h"
 #include "integrators/paths/traced_scene.h"
 #include "integrators/terms/term.h"
-#include "limn/core/moved.h"
+#include "limn/core/parameter.h"
 #include "limn/integrators/methods.h"
 
 namespace limn {

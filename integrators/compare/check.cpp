@@ -8,14 +8,11 @@
 #include <cmath>
 #include <limits>
 
-#include "integrators/compare/check_bend.h"
-#include "integrators/compare/check_samples.h"
 #include "integrators/compare/check_scores.h"
 #include "integrators/compare/check_step.h"
 #include "integrators/terms/term.h"
 #include "limn/core/blur_tracer.h"
-#include "limn/core/field_error.h"
-#include "limn/core/moved.h"
+#include "limn/core/error.h"
 #include "limn/core/parameter.h"
 #include "limn/integrators/methods.h"
 #include "limn/integrators/options.h"

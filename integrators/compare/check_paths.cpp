@@ -8,7 +8,6 @@
 #include "integrators/pilot/term_estimator.h"
 #include "limn/core/error.h"
 #include "limn/core/exposure.h"
-#include "limn/core/moved.h"
 #include "limn/core/parameter.h"
 #include "limn/edgetree/edge_sampler_types.h"
 #include "limn/integrators/check.h"

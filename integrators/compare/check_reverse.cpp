@@ -9,7 +9,6 @@
 #include "integrators/pilot/term_estimator.h"
 #include "limn/core/error.h"
 #include "limn/core/exposure.h"
-#include "limn/core/field_error.h"
 #include "limn/core/parameter.h"
 #include "limn/integrators/backward.h"
 #include "limn/integrators/methods.h"

@@ -1,15 +1,13 @@
-// The step at which a gradient is checked: small against what moves in the image, by a pilot.
+// The step and the samples with which a gradient is checked, by pilots, and slopes on both sides of
+// a parameter's value.
 #include "integrators/compare/check_step.h"
 
 #include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 
 #include "integrators/compare/edge_events.h"
 #include "integrators/methods/move_rounding.h"
-#include "limn/core/error.h"
-#include "limn/core/moved.h"
 #include "limn/core/parameter.h"
 #include "limn/integrators/differences.h"
 #include "limn/integrators/statistics.h"
@@ -147,6 +145,55 @@ double largest_step(const Scene& scene, const Parameter& parameter) {
   return std::max(step, parameter.natural_step);
 }
 
+// (I(reach) - I(0)) / reach in batches, with negative reach on the side before: a central
+// difference around half the way. No batches if the run was interrupted.
+std::vector<Moments::Batch> slope_of_blocks(const Scene& scene, const std::string& name,
+                                            double reach, int block, const RunSettings& settings,
+                                            const std::optional<Blur>& blur) {
+  const DifferenceJob job{name, {0.5 * std::fabs(reach)}, {{1}}};
+  const CentralDifferences run = central_differences(
+      find_parameter(scene, name).moved(scene, 0.5 * reach), {job}, block, settings, false, blur);
+  if (run.spp < settings.spp) return {};
+  return run.estimates[0][0].blocks.kept();
+}
+
+// With X(r) the slope over the way r after the value minus that over r before it, X is K + c r for
+// small r where the image bends by K, and 2 X(r) - X(2 r) = K. All from the same samples. No
+// batches if the run was interrupted.
+std::vector<Moments::Batch> bend_of_blocks(const Scene& scene, const std::string& name, double step,
+                                           int block, const RunSettings& settings,
+                                           const std::optional<Blur>& blur) {
+  std::vector<Moments::Batch> batches;
+  RunSettings own = settings;
+  int done = 0;
+  if (settings.progress) {
+    own.progress = [&](double part) { settings.progress(0.25 * (done + part)); };
+  }
+  for (const auto& [reach, factor] : {std::pair{step, 2.0}, {2 * step, -1.0}}) {
+    for (const double side : {1.0, -1.0}) {
+      auto more = slope_of_blocks(scene, name, side * reach, block, own, blur);
+      if (more.empty() || (done > 0 && batches.size() != more.size())) return {};
+      if (done++ == 0) {
+        batches = more;
+        for (Moments::Batch& batch : batches) batch.sums.assign(batch.sums.size(), 0.0);
+      }
+      for (size_t b = 0; b < batches.size(); ++b)
+        for (size_t i = 0; i < batches[b].sums.size(); ++i)
+          batches[b].sums[i] += side * factor * more[b].sums[i];
+    }
+  }
+  return batches;
+}
+
+// A short run does not know its variances well: the next one takes so many times its time at most.
+// Not tuned.
+constexpr double kMostGrowth = 16;
+// The error aimed at, over the one requested: variances are known to some ten per cent. Not tuned.
+constexpr double kMargin = 0.85;
+constexpr double kLeastShare = 0.125;  // of the time. Not tuned.
+// With steps that shrink as n^-1/5 the variance of edges in differences goes with n^-4/5.
+constexpr double kVariancePower = 1.25;
+
 }  // namespace
 
 double find_check_step(const Scene& scene, const std::string& parameter, const Windows& windows,
@@ -211,6 +258,60 @@ double reduced_step(const DifferenceResult& differences, double step, const Wind
   const double ratio = larger_ratio(windows, differences.at_step, changes, kExtrapolation,
                                     static_cast<double>(differences.spp), kShows);
   return ratio > kAllowedBias ? power_of_two_below(step_for_ratio(step, ratio)) : step;
+}
+
+std::optional<Bend> find_bend(const Scene& scene, const std::string& name, double step,
+                              const Windows& windows, const std::vector<double>& weights,
+                              const RunSettings& settings, const std::optional<Blur>& blur) {
+  const auto batches = bend_of_blocks(scene, name, step, windows.fine(), settings, blur);
+  const std::vector<double> of_blocks = windows.spread(weights);
+  Moments moments(1), single(windows.size());
+  for (const Moments::Batch& batch : batches) {
+    double sum = 0;
+    for (size_t i = 0; i < of_blocks.size(); ++i) sum += of_blocks[i] * batch.sums[i];
+    moments.add_batch({sum}, batch.samples);
+    single.add_batch(windows.gather(batch.sums), batch.samples);
+  }
+  if (moments.batches() < 2) return std::nullopt;
+  Bend bend;
+  bend.sum.value = moments.mean(0);
+  bend.sum.error = std::sqrt(moments.variance(0));
+  if (bend.sum.value != 0)
+    bend.sum.z = normal_from_student(bend.sum.value / bend.sum.error, moments.degrees());
+  double variance = 0;
+  for (size_t k = 0; k < weights.size(); ++k) {
+    const double error = std::sqrt(single.variance(k));
+    bend.most += std::fabs(weights[k]) * magnitude_without_noise(single.mean(k), error);
+    variance += weights[k] * weights[k] * error * error;
+  }
+  bend.most_error = std::sqrt(variance);
+  return bend;
+}
+
+// With variances a / n and b / m and costs n s + m t, the least cost for the sum of variances has
+// n and m in proportion to sqrt(a / s) and sqrt(b / t).
+std::optional<CheckSamples> more_samples(const CheckCost& gradient, const CheckCost& differences,
+                                         double factor, double seconds) {
+  const CheckCost* const runs[2] = {&gradient, &differences};
+  double cost[2], spent[2], sum = 0, before = 0;
+  for (int i = 0; i < 2; ++i) {
+    const auto n = static_cast<double>(runs[i]->samples);
+    cost[i] = std::max(runs[i]->seconds, 1e-9) / n;
+    spent[i] = std::sqrt(runs[i]->variance * n * cost[i]);
+    sum += spent[i];
+    before += runs[i]->seconds;
+  }
+  const double most = std::min(seconds, kMostGrowth * before);
+  if (most <= before || !(sum > 0)) return std::nullopt;
+  for (double& part : spent) part = std::max(part, kLeastShare * sum);
+  const double wanted =
+      (gradient.variance + differences.variance) * std::pow(kMargin * factor, 2 * kVariancePower);
+  const double scale = std::min(sum / wanted, most / (spent[0] + spent[1]));
+  const auto samples = [&](int i) {
+    return static_cast<int64_t>(std::clamp(scale * spent[i] / cost[i], double{kFirstCheckSamples},
+                                           double{kMostCheckSamples}));
+  };
+  return CheckSamples{samples(0), samples(1)};
 }
 
 }  // namespace limn

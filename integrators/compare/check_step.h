@@ -1,5 +1,6 @@
 #pragma once
-// The step at which a gradient is checked against differences.
+// The step and the samples with which a gradient is checked, and slopes on both sides of a value.
+#include <cstdint>
 #include <optional>
 
 #include "integrators/compare/check_scores.h"
@@ -26,5 +27,45 @@ double reduced_step(const DifferenceResult& differences, double step, const Wind
 // step; none if they do so in the scene. Beyond its range, a texel of an opacity changes nothing.
 std::optional<Scene> with_texels_inside(const Scene& scene, const Parameter& parameter,
                                         double step);
+
+struct Bend {
+  Score sum;  // of a weighted sum of windows
+  // The sum of the bends of single windows without their signs: what parts in several places may
+  // bend one up and another down. Noise adds nothing to it in the mean (but may make it negative).
+  double most = 0, most_error = 0;
+};
+
+// The slope after the parameter's value minus the slope before it, from one-sided differences over
+// 2 step and step. What grows in proportion to the step is taken off: an image that is curved does
+// not bend. weights: one for each window. blur: see central_differences(). None if the run was
+// interrupted.
+std::optional<Bend> find_bend(const Scene& scene, const std::string& parameter, double step,
+                              const Windows& windows, const std::vector<double>& weights,
+                              const RunSettings& settings,
+                              const std::optional<Blur>& blur = std::nullopt);
+
+// Samples per pixel.
+struct CheckSamples {
+  int64_t gradient = 0, differences = 0;
+};
+
+// What a run cost and what its mean's variance was.
+struct CheckCost {
+  int64_t samples = 0;
+  double seconds = 0;
+  double variance = 0;
+};
+
+// The first run's: enough for variances.
+inline constexpr int64_t kFirstCheckSamples = 16;
+// At most: a second run takes twice as many, in an int.
+inline constexpr int64_t kMostCheckSamples = 1 << 29;
+
+// The samples of least time with which the error of the difference becomes `factor` times as large,
+// or the smallest error that takes `seconds` at most. Nothing where that is no longer run. Neither
+// takes less than an eighth of the time: a few samples may not hold the events that rule their
+// variance.
+std::optional<CheckSamples> more_samples(const CheckCost& gradient, const CheckCost& differences,
+                                         double factor, double seconds);
 
 }  // namespace limn

@@ -1,11 +1,11 @@
 // Methods in turn at equal time, and what their runs add up to.
 #include "limn/integrators/compare.h"
+#include "limn/core/memory.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
-#include "integrators/estimates/peak_memory.h"
 #include "limn/core/rng.h"
 
 namespace limn {

@@ -1,5 +1,4 @@
 // Methods of images in a comparison, and a reference from independent runs.
-#include "limn/integrators/compare_images.h"
 
 #include <fmt/format.h>
 

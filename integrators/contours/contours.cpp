@@ -6,7 +6,6 @@
 #include <cmath>
 #include <tuple>
 
-#include "limn/core/error.h"
 #include "limn/core/prefetch.h"
 #include "limn/edgetree/edge_sampler_types.h"
 

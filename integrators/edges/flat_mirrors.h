@@ -4,7 +4,7 @@
 // the mirror, in the direction M w of p's own direction w, M = 1 - 2 n n^T. M keeps lengths and
 // angles, so all that is known of edges that p sees holds for those that p* sees; only the segments
 // from p to the mirror and from there to the edge tell what hides them. In a chain of mirrors the
-// images are taken one after the other. Planes that refract are seen through (flat_layers.h).
+// images are taken one after the other. Planes that refract are seen through (FlatLayer).
 #include <array>
 #include <cstdint>
 #include <memory>
@@ -13,6 +13,7 @@
 
 #include "limn/core/camera.h"
 #include "limn/core/scene.h"
+#include "limn/core/vec.h"
 
 namespace limn {
 
@@ -122,5 +123,18 @@ bool is_mirrored(const Vec3d& n, const Vec3d& wi, const Vec3d& wo);
 // side of wi; black where another smooth ray leaves to that side.
 Rgb<double> mirrored_share(std::span<const SmoothRay<double>> rays, const Vec3d& n,
                            const Vec3d& wi);
+
+struct FlatLayer {
+  double height;  // along the layers' normal; positive
+  double index;   // of refraction; of all layers over any one
+};
+
+// The unit direction in which a point sees another one through layers. With h_j their heights, n_j
+// their indices and R the distance of both points across the normal, the path has
+//   sum over j of h_j tan(theta_j) = R,   n_j sin(theta_j) the same for all j.
+// In u = tan(theta) of the layer of the least index the sum is concave and grows without bound: it
+// has one root, to which Newton's method rises from 0. way: from the one to the other; n: the unit
+// normal along it, of which way has the sum of all heights.
+Vec3d direction_through(std::span<const FlatLayer> layers, const Vec3d& n, const Vec3d& way);
 
 }  // namespace limn

@@ -13,7 +13,6 @@
 #include "integrators/edges/texture_discontinuities.h"
 #include "limn/core/duplicate_faces.h"
 #include "limn/core/lights.h"
-#include "limn/core/names.h"
 #include "limn/core/surface_point.h"
 #include "limn/edgetree/crossing_curves.h"
 #include "limn/edgetree/touching.h"
@@ -96,6 +95,30 @@ void drop_folds(EdgeMesh& mesh) {
     if (edge.edge_class == EdgeClass::kSharp) edge.edge_class = EdgeClass::kSmooth;
 }
 
+using ShapePair = std::array<ShapeId, 2>;
+
+// Those of lines of contact, not of crossings.
+std::set<ShapePair> pressed_pairs(const EdgeSamplerInput& edges) {
+  std::set<ShapePair> pairs;
+  const auto is_of_lines = [](const EdgeMesh& mesh) { return !mesh.shape.valid(); };
+  const auto found = std::find_if(edges.objects.begin(), edges.objects.end(), is_of_lines);
+  if (found == edges.objects.end()) return pairs;
+  const EdgeMesh& lines = *found;
+  for (uint32_t e = 0; e < lines.edges.size(); ++e) {
+    const FacesAround around = lines.around(EdgeId(e));
+    if (around.incidence(0).motion_group == kNoMotionGroup) continue;
+    const auto [first, second] = std::minmax(around.faces[0].shape, around.faces[1].shape);
+    pairs.insert({first, second});
+  }
+  return pairs;
+}
+
+std::string pair_in_text(const Scene& scene, const ShapePair& pair) {
+  const std::string first = quoted_name(scene, pair[0]);
+  if (pair[0] == pair[1]) return fmt::format("faces of {}", first);
+  return fmt::format("{} and {}", first, quoted_name(scene, pair[1]));
+}
+
 }  // namespace
 
 EdgeSamplerInput make_scene_edges(const Scene& scene, int threads) {
@@ -144,34 +167,6 @@ void add_light(const Scene& scene, EdgeSamplerInput& input) {
   };
   input.environment = std::make_shared<RadiancePyramid>(brightness, 8, 2);
 }
-
-namespace {
-
-using ShapePair = std::array<ShapeId, 2>;
-
-// Those of lines of contact, not of crossings.
-std::set<ShapePair> pressed_pairs(const EdgeSamplerInput& edges) {
-  std::set<ShapePair> pairs;
-  const auto is_of_lines = [](const EdgeMesh& mesh) { return !mesh.shape.valid(); };
-  const auto found = std::find_if(edges.objects.begin(), edges.objects.end(), is_of_lines);
-  if (found == edges.objects.end()) return pairs;
-  const EdgeMesh& lines = *found;
-  for (uint32_t e = 0; e < lines.edges.size(); ++e) {
-    const FacesAround around = lines.around(EdgeId(e));
-    if (around.incidence(0).motion_group == kNoMotionGroup) continue;
-    const auto [first, second] = std::minmax(around.faces[0].shape, around.faces[1].shape);
-    pairs.insert({first, second});
-  }
-  return pairs;
-}
-
-std::string pair_in_text(const Scene& scene, const ShapePair& pair) {
-  const std::string first = quoted_name(scene, pair[0]);
-  if (pair[0] == pair[1]) return fmt::format("faces of {}", first);
-  return fmt::format("{} and {}", first, quoted_name(scene, pair[1]));
-}
-
-}  // namespace
 
 void warn_of_contacts(const Scene& scene, const EdgeSamplerInput* edges,
                       std::vector<std::string>& warnings) {

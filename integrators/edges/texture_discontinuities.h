@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "limn/core/scene.h"
+#include "limn/core/texture.h"
 #include "limn/edgetree/texture_edges.h"
 
 namespace limn {
@@ -47,5 +48,14 @@ class TextureDiscontinuities {
 // InputError if there are more than TextureDiscontinuities::kMost segments. Adds one warning that
 // names the shapes with such a meridian.
 void check_texture_edges(const Scene& scene, std::vector<std::string>& warnings);
+
+// As Texture::add_discontinuities. Where texture coordinates are not linear over the face (spheres,
+// disks) lines are curves: segments lie off them by about kOffCurve at most, but around the axis.
+// The meridian where an angle comes back to its beginning is not found.
+bool add_face_discontinuities(const Texture& texture, const Mesh& mesh, FaceId face, size_t most,
+                              Texture::Discontinuities& lines);
+
+// In barycentric coordinates.
+inline constexpr double kOffCurve = 0x1p-9;
 
 }  // namespace limn

@@ -98,6 +98,13 @@ void add_direction(std::vector<Vec3d>& directions, const Vec3d& n) {
   if (std::none_of(directions.begin(), directions.end(), is_like)) directions.push_back(n);
 }
 
+Viewpoint viewpoint_of(const Scene& scene) {
+  const Camera& camera = scene.camera;
+  if (camera.has_lens()) return Viewpoint(value(camera.origin));
+  return {scene, camera.is_orthographic() ? LightOrigin{camera.forward, true}
+                                          : LightOrigin{camera.origin}};
+}
+
 }  // namespace
 
 Viewpoint::Viewpoint(const Scene& scene, const LightOrigin& origin)
@@ -181,17 +188,6 @@ bool Viewpoint::is_candidate(const EdgeMesh& mesh, EdgeId id) const {
   const FaceId second = edge.faces[1];
   return limn::is_candidate(mesh, id, first, second.valid() ? facing(mesh, second) : first);
 }
-
-namespace {
-
-Viewpoint viewpoint_of(const Scene& scene) {
-  const Camera& camera = scene.camera;
-  if (camera.has_lens()) return Viewpoint(value(camera.origin));
-  return {scene, camera.is_orthographic() ? LightOrigin{camera.forward, true}
-                                          : LightOrigin{camera.origin}};
-}
-
-}  // namespace
 
 Viewpoints::Viewpoints(const Scene& scene) : camera(viewpoint_of(scene)) {
   for (const auto& light : scene.delta_lights) {

@@ -99,23 +99,6 @@ class GradientRunner {
   uint64_t added_ = 0, tape_bytes_ = 0;
 };
 
-}  // namespace
-
-BatchSums run_batch(const GradientEstimator& estimator, const Batch& batch, int threads,
-                    ProgressCounter& progress) {
-  return GradientRunner(estimator, batch, threads, progress).run();
-}
-
-size_t steps_of(const GradientEstimator& estimator, const Batch& batch) {
-  size_t steps = estimator.samples_pixels() ? estimator.tiles(batch) : 0;
-  for (size_t slot = 0; slot < estimator.slots(); ++slot) {
-    steps += tiles_of(FilmBatch(estimator, slot, batch).count);
-  }
-  return steps;
-}
-
-namespace {
-
 // Of each parameter what a sample, one of so many of its kind, adds to the derivative.
 void log_numbers(const GradientEstimator& estimator, const GradientTile& tile, double samples,
                  SampleLog& log) {
@@ -154,6 +137,19 @@ Batch batch_of(const GradientEstimator& estimator, RunSettings settings, int64_t
 }
 
 }  // namespace
+
+BatchSums run_batch(const GradientEstimator& estimator, const Batch& batch, int threads,
+                    ProgressCounter& progress) {
+  return GradientRunner(estimator, batch, threads, progress).run();
+}
+
+size_t steps_of(const GradientEstimator& estimator, const Batch& batch) {
+  size_t steps = estimator.samples_pixels() ? estimator.tiles(batch) : 0;
+  for (size_t slot = 0; slot < estimator.slots(); ++slot) {
+    steps += tiles_of(FilmBatch(estimator, slot, batch).count);
+  }
+  return steps;
+}
 
 void run_sample(const GradientEstimator& estimator, const RunSettings& settings,
                 const NonFinite::SampleId& place, SampleLog& log) {

@@ -66,6 +66,31 @@ std::string one_line(std::string text) {
   return text;
 }
 
+using Identity = std::vector<std::pair<std::string, std::string>>;
+
+// The first row in which two runs differ; null where there is none.
+struct Difference {
+  std::string name, here, there;
+};
+std::unique_ptr<Difference> difference(const Identity& here, const Identity& there) {
+  for (size_t i = 0; i < std::max(here.size(), there.size()); ++i) {
+    const auto row = [i](const Identity& run) {
+      return i < run.size() ? run[i] : std::pair<std::string, std::string>{"", "nothing"};
+    };
+    const auto a = row(here), b = row(there);
+    if (a == b) continue;
+    return std::make_unique<Difference>(
+        Difference{a.first.empty() ? b.first : a.first, a.second, b.second});
+  }
+  return nullptr;
+}
+
+std::unique_ptr<PartFile> open_part(const std::string& file, bool damaged = false) {
+  auto stream = std::make_unique<std::ifstream>(file, std::ios::binary);
+  if (!*stream) throw InputError({file}, "cannot be read");
+  return std::make_unique<PartFile>(std::move(stream), file, damaged);
+}
+
 }  // namespace
 
 Part parse_part(const std::string& text) {
@@ -224,35 +249,6 @@ bool PartFile::find_batch() {
   end_ = stream_->tellg();
   return true;
 }
-
-namespace {
-
-using Identity = std::vector<std::pair<std::string, std::string>>;
-
-// The first row in which two runs differ; null where there is none.
-struct Difference {
-  std::string name, here, there;
-};
-std::unique_ptr<Difference> difference(const Identity& here, const Identity& there) {
-  for (size_t i = 0; i < std::max(here.size(), there.size()); ++i) {
-    const auto row = [i](const Identity& run) {
-      return i < run.size() ? run[i] : std::pair<std::string, std::string>{"", "nothing"};
-    };
-    const auto a = row(here), b = row(there);
-    if (a == b) continue;
-    return std::make_unique<Difference>(
-        Difference{a.first.empty() ? b.first : a.first, a.second, b.second});
-  }
-  return nullptr;
-}
-
-std::unique_ptr<PartFile> open_part(const std::string& file, bool damaged = false) {
-  auto stream = std::make_unique<std::ifstream>(file, std::ios::binary);
-  if (!*stream) throw InputError({file}, "cannot be read");
-  return std::make_unique<PartFile>(std::move(stream), file, damaged);
-}
-
-}  // namespace
 
 PartWriter::PartWriter(Part part, std::string arguments, std::string file)
     : part_(part), arguments_(one_line(std::move(arguments))), file_(std::move(file)) {}

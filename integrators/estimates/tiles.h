@@ -1,7 +1,6 @@
 #pragma once
 // The pixels of a film, in an order that no number of threads changes.
 #include <cmath>
-#include <cstdint>
 #include <limits>
 #include <vector>
 

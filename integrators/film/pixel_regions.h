@@ -4,12 +4,10 @@
 #include <atomic>
 #include <functional>
 #include <optional>
-#include <span>
-#include <utility>
 #include <vector>
 
 #include "integrators/estimates/tiles.h"
-#include "limn/core/coincident_faces.h"
+#include "limn/core/face_overlaps.h"
 #include "limn/core/scene.h"
 #include "limn/core/visible_regions.h"
 

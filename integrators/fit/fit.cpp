@@ -9,7 +9,7 @@
 #include "integrators/fit/fit_impl.h"
 #include "integrators/methods/faces_estimator.h"
 #include "integrators/methods/hair_gaps.h"
-#include "integrators/methods/selection.h"
+#include "integrators/methods/term_job.h"
 #include "integrators/terms/term.h"
 #include "limn/core/error.h"
 #include "limn/core/exposure.h"

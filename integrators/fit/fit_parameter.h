@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "integrators/fit/optimiser.h"
+#include "integrators/fit/quasi_newton.h"
 #include "limn/core/parameter.h"
 #include "limn/integrators/fit.h"
 #include "limn/integrators/large_steps.h"

@@ -2,9 +2,12 @@
 // Minimising a function whose values and derivatives are exact: limited-memory BFGS, and a line
 // search to Wolfe's conditions. After Nocedal and Wright 2006, "Numerical Optimization",
 // algorithms 7.4, 3.5 and 3.6.
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <vector>
+
+#include "limn/integrators/fit.h"
 
 namespace limn {
 
@@ -44,5 +47,21 @@ struct LinePoint {
 std::optional<LinePoint> wolfe_search(
     const std::function<std::optional<LinePoint>(double)>& evaluate, const LinePoint& start,
     double first);
+
+// Of one parameter. Gradients and steps are per natural step, so Adam's steps are of size 1.
+class Optimiser {
+ public:
+  Optimiser(OptimiserKind kind, size_t size);
+
+  // What to add to the numbers, for a step of length 1; `count` of gradients that came before.
+  std::vector<double> step(const std::vector<double>& gradient, int64_t count);
+
+  // Running means of gradients and of their squares, not corrected for their start at zero; empty
+  // for gradient descent.
+  std::vector<double> first, second;
+
+ private:
+  OptimiserKind kind_;
+};
 
 }  // namespace limn

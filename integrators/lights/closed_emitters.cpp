@@ -19,6 +19,29 @@ constexpr const char* kInstead = "use another method (render: path)";
   refuse_light("analytic", where, what);
 }
 
+uint64_t next_number() {
+  static std::atomic<uint64_t> last = 0;
+  return ++last;
+}
+
+// Whether two faces of one plane stay in one, to first order and rounding.
+bool move_alike(const Mesh& mesh, FaceRef first, FaceRef second) {
+  if (mesh.position_tangents.empty()) return true;
+  const auto x = face_corners<Dual>(mesh, first.face), y = face_corners<Dual>(mesh, second.face);
+  const Vec3<Dual> n = normalize(cross(x[1] - x[0], x[2] - x[0]));
+  double speed = 0, apart = 0;
+  for (int k = 0; k < 3; ++k) {
+    const Lanes distance = dot(n, y[k] - x[0]).d;
+    for (int lane = 0; lane < kLanes; ++lane) {
+      apart = std::max(apart, std::fabs(distance[lane]));
+      for (int c = 0; c < 3; ++c) {
+        speed = std::max({speed, std::fabs(x[k][c].d[lane]), std::fabs(y[k][c].d[lane])});
+      }
+    }
+  }
+  return apart <= 1e-5 * speed;
+}
+
 }  // namespace
 
 void check_closed_light(const Scene& scene) {
@@ -56,15 +79,6 @@ void check_closed_light(const Scene& scene) {
   }
 }
 
-namespace {
-
-uint64_t next_number() {
-  static std::atomic<uint64_t> last = 0;
-  return ++last;
-}
-
-}  // namespace
-
 ClosedLight::SharedGeometry::SharedGeometry(const Scene& scene, int threads)
     : number(next_number()), copies(scene), overlaps(scene, copies, threads), tree(scene) {}
 
@@ -93,28 +107,6 @@ void ClosedLight::add_emitters() {
     if (scene_.shapes[s].is_emitter && scene_.max_depth == 2) add_emitter(ShapeId(s));
   }
 }
-
-namespace {
-
-// Whether two faces of one plane stay in one, to first order and rounding.
-bool move_alike(const Mesh& mesh, FaceRef first, FaceRef second) {
-  if (mesh.position_tangents.empty()) return true;
-  const auto x = face_corners<Dual>(mesh, first.face), y = face_corners<Dual>(mesh, second.face);
-  const Vec3<Dual> n = normalize(cross(x[1] - x[0], x[2] - x[0]));
-  double speed = 0, apart = 0;
-  for (int k = 0; k < 3; ++k) {
-    const Lanes distance = dot(n, y[k] - x[0]).d;
-    for (int lane = 0; lane < kLanes; ++lane) {
-      apart = std::max(apart, std::fabs(distance[lane]));
-      for (int c = 0; c < 3; ++c) {
-        speed = std::max({speed, std::fabs(x[k][c].d[lane]), std::fabs(y[k][c].d[lane])});
-      }
-    }
-  }
-  return apart <= 1e-5 * speed;
-}
-
-}  // namespace
 
 void ClosedLight::add_emitter(ShapeId id) {
   const Shape& shape = scene_.shape(id);

@@ -13,7 +13,6 @@
 // those of corners.
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include "integrators/edges/edge_sides.h"

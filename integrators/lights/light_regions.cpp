@@ -156,6 +156,34 @@ DirectionCone around_points(const EmitterHull& emitter, const Vec3d& p) {
   return cone;
 }
 
+double cap_solid_angle(const DirectionCap& cap) {
+  return 2 * kPi * cap.sine * cap.sine / (1 + cap.cosine);
+}
+
+// A point of a convex polygon, uniform: of a fan of triangles.
+Vec3d draw_in_polygon(const EmitterHull& emitter, double u1, double u2) {
+  const Vec3d& a = emitter.points[0];
+  double left = u1 * emitter.area;
+  for (size_t i = 2;; ++i) {
+    const Vec3d b = emitter.points[i - 1] - a, c = emitter.points[i] - a;
+    const double part = 0.5 * length(cross(b, c));
+    if (left >= part && i + 1 < emitter.points.size()) {
+      left -= part;
+      continue;
+    }
+    const double root = std::sqrt(std::min(left / part, 1.0));
+    return a + b * (root * (1 - u2)) + c * (root * u2);
+  }
+}
+
+bool is_in_polygon(const EmitterHull& emitter, const Vec3d& y) {
+  for (size_t i = 0; i < emitter.points.size(); ++i) {
+    const Vec3d &a = emitter.points[i], &b = emitter.points[(i + 1) % emitter.points.size()];
+    if (dot(cross(b - a, y - a), emitter.plane.n) < 0) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 EmitterHull make_emitter_hull(const Mesh& mesh, ShadingModel shading) {
@@ -307,38 +335,6 @@ bool LightRegions::any_in(const Scene& scene) {
   }
   return scene.environment && has_bright_patch(*scene.environment);
 }
-
-namespace {
-
-double cap_solid_angle(const DirectionCap& cap) {
-  return 2 * kPi * cap.sine * cap.sine / (1 + cap.cosine);
-}
-
-// A point of a convex polygon, uniform: of a fan of triangles.
-Vec3d draw_in_polygon(const EmitterHull& emitter, double u1, double u2) {
-  const Vec3d& a = emitter.points[0];
-  double left = u1 * emitter.area;
-  for (size_t i = 2;; ++i) {
-    const Vec3d b = emitter.points[i - 1] - a, c = emitter.points[i] - a;
-    const double part = 0.5 * length(cross(b, c));
-    if (left >= part && i + 1 < emitter.points.size()) {
-      left -= part;
-      continue;
-    }
-    const double root = std::sqrt(std::min(left / part, 1.0));
-    return a + b * (root * (1 - u2)) + c * (root * u2);
-  }
-}
-
-bool is_in_polygon(const EmitterHull& emitter, const Vec3d& y) {
-  for (size_t i = 0; i < emitter.points.size(); ++i) {
-    const Vec3d &a = emitter.points[i], &b = emitter.points[(i + 1) % emitter.points.size()];
-    if (dot(cross(b - a, y - a), emitter.plane.n) < 0) return false;
-  }
-  return true;
-}
-
-}  // namespace
 
 std::optional<DirectionCap> LightRegions::cap_around(const Region& region, const Vec3d& x) const {
   if (!region.shape.valid()) return region.patch.cap;

@@ -12,7 +12,6 @@
 #include <bitset>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
 #include <memory>
 #include <new>
 #include <optional>

@@ -17,7 +17,7 @@
 #include "integrators/estimates/checksum.h"
 #include "integrators/lights/direct_light_check.h"
 #include "integrators/methods/visibility_estimator.h"
-#include "limn/core/environment_map.h"
+#include "limn/core/environment.h"
 #include "limn/core/error.h"
 #include "limn/core/exposure.h"
 #include "limn/core/memory.h"
@@ -75,6 +75,53 @@ void check_scene_and_memory(const Scene& scene, int spp, int lines) {
   // Two ends of each line, mostly less; in rows, then joined.
   require_memory({scene.file}, points * 2 * sizeof(float) * (7 + 2.0 * lines), "the baked view",
                  "ask for fewer samples or lines, or a smaller image");
+}
+
+// "NAME VALUE" of each line of a text.
+std::map<std::string, std::string> lines_of(const std::string& text) {
+  std::map<std::string, std::string> values;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    const size_t space = std::min(line.find(' '), line.size());
+    values[line.substr(0, space)] = line.substr(std::min(space + 1, line.size()));
+  }
+  return values;
+}
+
+// A number of the text in a range; -1 for anything else.
+int64_t number_in(const std::string& text, int64_t most) {
+  int64_t value = -1;
+  std::from_chars(text.data(), text.data() + text.size(), value);
+  return value <= most ? value : -1;
+}
+
+template <class T>
+const char* take(const char* from, size_t count, std::vector<T>& numbers) {
+  numbers.resize(count);
+  std::memcpy(numbers.data(), from, count * sizeof(T));
+  return from + count * sizeof(T);
+}
+
+// Cosines and sines of angles from 0 to pi, to 1e-11, many at once: Taylor's sums around pi / 2.
+void turn_angles(std::span<const float> angles, double* cosines, double* sines) {
+  constexpr int kTerms = 8;
+  constexpr auto kInverses = [] {  // of factorials, with the signs of cos (even) and sin (odd)
+    std::array<double, 2 * kTerms> inverses{1, 1};
+    for (size_t i = 2; i < inverses.size(); ++i) {
+      inverses[i] = -inverses[i - 2] / static_cast<double>(i * (i - 1));
+    }
+    return inverses;
+  }();
+  for (size_t i = 0; i < angles.size(); ++i) {
+    const double y = std::fabs(double{angles[i]}) - kPi / 2, y2 = y * y;
+    double cosine = 0, sine = 0;
+    for (int k = 2 * kTerms - 2; k >= 0; k -= 2) {
+      cosine = cosine * y2 + kInverses[k];
+      sine = sine * y2 + kInverses[k + 1];
+    }
+    cosines[i] = -y * sine;
+    sines[i] = cosine;
+  }
 }
 
 }  // namespace
@@ -150,35 +197,6 @@ std::string BakedView::bytes() const {
   return bytes += bytes_of(sum);
 }
 
-namespace {
-
-// "NAME VALUE" of each line of a text.
-std::map<std::string, std::string> lines_of(const std::string& text) {
-  std::map<std::string, std::string> values;
-  std::istringstream lines(text);
-  for (std::string line; std::getline(lines, line);) {
-    const size_t space = std::min(line.find(' '), line.size());
-    values[line.substr(0, space)] = line.substr(std::min(space + 1, line.size()));
-  }
-  return values;
-}
-
-// A number of the text in a range; -1 for anything else.
-int64_t number_in(const std::string& text, int64_t most) {
-  int64_t value = -1;
-  std::from_chars(text.data(), text.data() + text.size(), value);
-  return value <= most ? value : -1;
-}
-
-template <class T>
-const char* take(const char* from, size_t count, std::vector<T>& numbers) {
-  numbers.resize(count);
-  std::memcpy(numbers.data(), from, count * sizeof(T));
-  return from + count * sizeof(T);
-}
-
-}  // namespace
-
 BakedView BakedView::of_bytes(const std::string& bytes, const std::string& file) {
   const auto fail = [&](const std::string& what) { throw InputError({file}, what); };
   const std::string title = bytes.substr(0, bytes.find('\n'));
@@ -240,32 +258,6 @@ struct BakedView::Columns {
   double turn;
   std::vector<std::array<double, 2>> around;  // cosine and sine of the azimuths with offset 0
 };
-
-namespace {
-
-// Cosines and sines of angles from 0 to pi, to 1e-11, many at once: Taylor's sums around pi / 2.
-void turn_angles(std::span<const float> angles, double* cosines, double* sines) {
-  constexpr int kTerms = 8;
-  constexpr auto kInverses = [] {  // of factorials, with the signs of cos (even) and sin (odd)
-    std::array<double, 2 * kTerms> inverses{1, 1};
-    for (size_t i = 2; i < inverses.size(); ++i) {
-      inverses[i] = -inverses[i - 2] / static_cast<double>(i * (i - 1));
-    }
-    return inverses;
-  }();
-  for (size_t i = 0; i < angles.size(); ++i) {
-    const double y = std::fabs(double{angles[i]}) - kPi / 2, y2 = y * y;
-    double cosine = 0, sine = 0;
-    for (int k = 2 * kTerms - 2; k >= 0; k -= 2) {
-      cosine = cosine * y2 + kInverses[k];
-      sine = sine * y2 + kInverses[k + 1];
-    }
-    cosines[i] = -y * sine;
-    sines[i] = cosine;
-  }
-}
-
-}  // namespace
 
 // Light of a pixel from the map is the sum of view(scale, direction), scale times the radiance from
 // there, and of end(scale, meridian, weights), scale times RadianceColumns::sum.

@@ -8,9 +8,8 @@
 #include "integrators/methods/blurred_estimator.h"
 #include "integrators/methods/drawn_alike.h"
 #include "integrators/methods/radiance_estimator.h"
-#include "limn/core/environment_map.h"
+#include "limn/core/environment.h"
 #include "limn/core/exposure.h"
-#include "limn/core/moved.h"
 #include "limn/core/parameter.h"
 
 namespace limn {

@@ -1,11 +1,9 @@
 // Derivatives of images made of visible faces, see faces_estimator.h.
-#include "integrators/methods/faces_method.h"
+#include "integrators/methods/term_job.h"
 
 #include "integrators/estimates/batches.h"
 #include "integrators/methods/faces_estimator.h"
-#include "integrators/methods/selection.h"
 #include "limn/core/error.h"
-#include "limn/core/field_error.h"
 #include "limn/integrators/parts.h"
 
 namespace limn {

@@ -2,15 +2,13 @@
 #include "limn/integrators/gradient.h"
 
 #include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 
 #include "integrators/methods/hair_gaps.h"
+#include "integrators/methods/term_job.h"
 #include "integrators/terms/term.h"
 #include "limn/core/error.h"
-#include "limn/core/field_error.h"
-#include "limn/core/moved.h"
 #include "limn/core/names.h"
 #include "limn/core/parameter.h"
 #include "limn/integrators/methods.h"
@@ -123,6 +121,17 @@ std::vector<std::string> trace_sample(const Scene& scene, const GradientOptions&
     throw InputError("the method \"" + method.name + "\" cannot trace single samples");
   }
   return method.trace(method, scene, options, settings, place);
+}
+
+std::vector<std::string> selected_terms(const std::vector<std::string>& known,
+                                        const std::vector<std::string>& chosen,
+                                        const std::string& file) {
+  for (const std::string& name : chosen) {
+    if (std::find(known.begin(), known.end(), name) != known.end()) continue;
+    throw InputError({file},
+                     "no term \"" + name + "\" here (terms of this scene: " + join(known) + ")");
+  }
+  return chosen.empty() ? known : chosen;
 }
 
 }  // namespace limn

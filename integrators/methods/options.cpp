@@ -7,7 +7,6 @@
 #include <cstdlib>
 
 #include "limn/core/error.h"
-#include "limn/core/field_error.h"
 #include "limn/core/names.h"
 #include "limn/core/parallel.h"
 

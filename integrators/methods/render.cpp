@@ -14,7 +14,6 @@
 #include "limn/core/check.h"
 #include "limn/core/error.h"
 #include "limn/core/exposure.h"
-#include "limn/core/field_error.h"
 #include "limn/core/names.h"
 #include "limn/integrators/methods.h"
 #include "limn/integrators/options.h"

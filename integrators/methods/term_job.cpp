@@ -8,11 +8,9 @@
 #include <cmath>
 #include <numeric>
 
-#include "integrators/edges/scene_edges.h"
 #include "integrators/edges/texture_discontinuities.h"
 #include "integrators/estimates/batches.h"
 #include "integrators/methods/run_notes.h"
-#include "integrators/methods/selection.h"
 #include "integrators/methods/term_sums.h"
 #include "integrators/paths/chain_light.h"
 #include "integrators/pilot/allocation.h"
@@ -21,12 +19,9 @@
 #include "integrators/pilot/film_flow.h"
 #include "integrators/pilot/pilot.h"
 #include "integrators/pilot/probed.h"
-#include "integrators/pilot/random_motion.h"
 #include "integrators/pilot/term_estimator.h"
 #include "limn/core/error.h"
 #include "limn/core/exposure.h"
-#include "limn/core/field_error.h"
-#include "limn/core/moved.h"
 #include "limn/core/parameter.h"
 #include "limn/edgetree/edge_sampler_types.h"
 #include "limn/integrators/parts.h"

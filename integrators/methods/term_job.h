@@ -30,4 +30,18 @@ std::vector<std::string> trace_terms(const TermMethod& method, const Scene& scen
                                      const GradientOptions& options, const RunSettings& settings,
                                      const NonFinite::SampleId& place);
 
+// Of an image that FacesEstimator makes: one term, `faces`.
+GradientResult run_faces(const Scene& scene, const GradientOptions& options,
+                         const RunSettings& settings);
+
+// As trace_sample() in gradient.h.
+std::vector<std::string> trace_faces(const Scene& scene, const GradientOptions& options,
+                                     const NonFinite::SampleId& place);
+
+// `chosen`, or all if none is chosen. InputError that lists `known` for a name that is not among
+// them. file: of the scene.
+std::vector<std::string> selected_terms(const std::vector<std::string>& known,
+                                        const std::vector<std::string>& chosen,
+                                        const std::string& file);
+
 }  // namespace limn

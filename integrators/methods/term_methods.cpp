@@ -7,7 +7,6 @@
 
 #include "integrators/lights/closed_light.h"
 #include "integrators/lights/direct_light_check.h"
-#include "integrators/methods/faces_method.h"
 #include "integrators/methods/term_job.h"
 #include "integrators/terms/term.h"
 

@@ -12,8 +12,8 @@
 #include "limn/core/duplicate_faces.h"
 #include "limn/core/exposure.h"
 #include "limn/core/framed_light.h"
-#include "limn/core/moved.h"
 #include "limn/core/names.h"
+#include "limn/core/parameter.h"
 
 namespace limn {
 

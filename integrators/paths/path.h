@@ -5,7 +5,6 @@
 // directions that move on purpose (direction_field.h, warp_field.h), the one direction of a light
 // without extent and the rays of smooth lobes, which follow the parameters. No light is drawn for
 // what smooth lobes see: there an emitter counts fully where a path meets it.
-#include <cstdint>
 #include <span>
 #include <type_traits>
 

@@ -2,7 +2,6 @@
 // The path tracer at a vertex: what is scattered there, and the next direction. Included by
 // path_follow.h.
 #include <algorithm>
-#include <cmath>
 
 #include "integrators/paths/path.h"
 #include "integrators/paths/path_directions.h"

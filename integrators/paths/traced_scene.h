@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "integrators/paths/path_context.h"
-#include "limn/core/coincident_faces.h"
+#include "limn/core/face_overlaps.h"
 
 namespace limn {
 

@@ -7,7 +7,6 @@
 #include <cmath>
 
 #include "limn/core/error.h"
-#include "limn/core/field_error.h"
 
 namespace limn {
 namespace {

@@ -22,56 +22,6 @@ std::vector<double> counts_to_try(const TermFigures& term) {
   return counts;
 }
 
-}  // namespace
-
-double most_work(double left, double each, int samples, size_t pixels) {
-  if (!(each > 0)) return kNoLimit;
-  return std::max(left, 0.0) / (each * std::max(samples, 1) * static_cast<double>(pixels));
-}
-
-// The least product of two sums lies on the lower hull of all choices, where every term has its own
-// least of variance / n + price * cost * n for one price. As the price falls, counts rise one by
-// one: each step is taken where both of its counts are alike.
-SampleCounts best_samples(const std::vector<TermFigures>& figures, double most) {
-  struct Step {
-    double price;
-    size_t term;
-    double count;  // after it
-  };
-  std::vector<Step> steps;
-  std::vector<double> samples;
-  double variance = 0, cost = 0;
-  for (size_t t = 0; t < figures.size(); ++t) {
-    const TermFigures& term = figures[t];
-    const std::vector<double> counts = counts_to_try(term);
-    samples.push_back(counts.front());
-    variance += term.variance / counts.front();
-    cost += term.cost_of(counts.front());
-    for (size_t i = 1; i < counts.size(); ++i) {
-      const double fewer = counts[i - 1], more = counts[i];
-      const double lost = term.variance / fewer - term.variance / more;
-      steps.push_back({lost / (term.cost_of(more) - term.cost_of(fewer)), t, more});
-    }
-  }
-  std::stable_sort(steps.begin(), steps.end(),
-                   [](const Step& a, const Step& b) { return a.price > b.price; });
-  double least = variance * cost;
-  std::vector<double> best = samples;
-  for (const Step& step : steps) {
-    const TermFigures& term = figures[step.term];
-    variance += term.variance * (1 / step.count - 1 / samples[step.term]);
-    cost += term.cost_of(step.count) - term.cost_of(samples[step.term]);
-    samples[step.term] = step.count;
-    if (cost > most) break;
-    if (variance * cost * kTie >= least) continue;
-    least = variance * cost;
-    best = samples;
-  }
-  return least > 0 ? SampleCounts(best) : SampleCounts();
-}
-
-namespace {
-
 constexpr int kSpreadRadii[] = {2, 4};  // windows of 5 by 5 and 9 by 9 cells
 constexpr double kLeastShare = 0.25;    // of the mean; not tuned
 constexpr int kMostInPixel = 64;        // not tuned
@@ -229,7 +179,55 @@ double best_scale(const std::vector<TermFigures>& terms, const std::vector<Wish>
   return scales.front();
 }
 
+constexpr int kLeastPilot = 4;  // two for each half
+
 }  // namespace
+
+double most_work(double left, double each, int samples, size_t pixels) {
+  if (!(each > 0)) return kNoLimit;
+  return std::max(left, 0.0) / (each * std::max(samples, 1) * static_cast<double>(pixels));
+}
+
+// The least product of two sums lies on the lower hull of all choices, where every term has its own
+// least of variance / n + price * cost * n for one price. As the price falls, counts rise one by
+// one: each step is taken where both of its counts are alike.
+SampleCounts best_samples(const std::vector<TermFigures>& figures, double most) {
+  struct Step {
+    double price;
+    size_t term;
+    double count;  // after it
+  };
+  std::vector<Step> steps;
+  std::vector<double> samples;
+  double variance = 0, cost = 0;
+  for (size_t t = 0; t < figures.size(); ++t) {
+    const TermFigures& term = figures[t];
+    const std::vector<double> counts = counts_to_try(term);
+    samples.push_back(counts.front());
+    variance += term.variance / counts.front();
+    cost += term.cost_of(counts.front());
+    for (size_t i = 1; i < counts.size(); ++i) {
+      const double fewer = counts[i - 1], more = counts[i];
+      const double lost = term.variance / fewer - term.variance / more;
+      steps.push_back({lost / (term.cost_of(more) - term.cost_of(fewer)), t, more});
+    }
+  }
+  std::stable_sort(steps.begin(), steps.end(),
+                   [](const Step& a, const Step& b) { return a.price > b.price; });
+  double least = variance * cost;
+  std::vector<double> best = samples;
+  for (const Step& step : steps) {
+    const TermFigures& term = figures[step.term];
+    variance += term.variance * (1 / step.count - 1 / samples[step.term]);
+    cost += term.cost_of(step.count) - term.cost_of(samples[step.term]);
+    samples[step.term] = step.count;
+    if (cost > most) break;
+    if (variance * cost * kTie >= least) continue;
+    least = variance * cost;
+    best = samples;
+  }
+  return least > 0 ? SampleCounts(best) : SampleCounts();
+}
 
 double spread_samples(const std::vector<TermFigures>& figures, const PlanGrid& grid,
                       SamplePlan& plan, double most) {
@@ -284,12 +282,6 @@ double trimmed_mean(std::vector<double> values) {
   return std::accumulate(values.begin(), values.begin() + static_cast<long>(kept), 0.0) /
          static_cast<double>(kept);
 }
-
-namespace {
-
-constexpr int kLeastPilot = 4;  // two for each half
-
-}  // namespace
 
 int pilot_samples(int spp) {
   // At 8 samples the least pilot takes half as much again, and without it squared error times time

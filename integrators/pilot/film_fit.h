@@ -5,11 +5,13 @@
 // under the scene, edges at rest included, less what the pixels lose and gain at their rims. So V
 // is the coefficient of a control variate: any one is right, and one that follows what a pixel sees
 // takes out most of what slides and is covered there, shadows and mirror images as well.
+#include <cstdint>
 #include <vector>
 
 #include "integrators/pilot/pilot.h"
-#include "integrators/pilot/probing_estimator.h"
+#include "integrators/pilot/probed.h"
 #include "integrators/pilot/sample_plan.h"
+#include "integrators/pilot/term_estimator.h"
 
 namespace limn {
 
@@ -72,5 +74,13 @@ class FilmProbe final : public ProbingEstimator {
   const PlanGrid& grid_;
   int turn_;
 };
+
+// A turn and a score of every pixel and parameter, of the order of what moves. Their means are not
+// zero: otherwise a change of the derivative that they should not make would go unseen in sums over
+// pixels.
+std::vector<DirectionField> random_fields(size_t count, const TermEstimator& estimator,
+                                          uint64_t seed);
+// The same of positions on the film.
+std::vector<FilmMotion> random_motions(size_t count, const TermEstimator& estimator, uint64_t seed);
 
 }  // namespace limn

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "integrators/pilot/probing_estimator.h"
+#include "integrators/pilot/probed.h"
 
 namespace limn {
 namespace {

@@ -1,6 +1,5 @@
 #pragma once
 // Second moments of single samples, cell by cell: what a pilot keeps.
-#include <array>
 #include <cstddef>
 #include <vector>
 

@@ -1,5 +1,4 @@
 // Motions by chance.
-#include "integrators/pilot/random_motion.h"
 
 #include "integrators/pilot/film_fit.h"
 

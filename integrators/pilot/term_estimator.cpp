@@ -9,7 +9,7 @@
 #include "integrators/paths/path_log.h"
 #include "integrators/pilot/vertex_terms.h"
 #include "limn/core/exposure.h"
-#include "limn/core/moved.h"
+#include "limn/core/parameter.h"
 
 namespace limn {
 namespace {

@@ -10,7 +10,6 @@
 // hands the record to a sink; it does not know the mode.
 #include <array>
 #include <optional>
-#include <vector>
 
 #include "integrators/edges/flat_mirrors.h"
 #include "integrators/estimates/sample_estimator.h"

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
-#include "integrators/edges/face_discontinuities.h"
 #include "integrators/edges/near_faces.h"
+#include "integrators/edges/texture_discontinuities.h"
 #include "integrators/paths/path_follow.h"
 #include "integrators/paths/straight_way.h"
 #include "limn/core/duplicate_faces.h"

@@ -1,7 +1,8 @@
 #pragma once
 // Where lines of light meet the points that faces with interpolated normals are lifted to
 // (limn/core/surface_point.h).
-#include <array>
+#include <cstdint>
+#include <span>
 #include <vector>
 
 #include "limn/core/box_tree.h"
@@ -54,5 +55,17 @@ class LiftedFaces {
   std::vector<FloatBox> boxes_;  // of what each holds
   BoxTree tree_;
 };
+
+// The segment from (t0, k0) to (t1, k1), t0 < t1.
+struct Stretch {
+  double t0, t1, k0, k1;
+  uint32_t label;
+
+  double at(double t) const { return k0 + (k1 - k0) * ((t - t0) / (t1 - t0)); }
+};
+
+// The parts of segments that lie above all others, ascending and disjoint; where two coincide, the
+// lower label wins. Takes time n log n for n segments.
+std::vector<Stretch> upper_envelope(std::span<const Stretch> segments);
 
 }  // namespace limn

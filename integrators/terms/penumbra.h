@@ -9,7 +9,6 @@
 // between these ways by how densely they are expected to meet it (the power heuristic; any shares
 // that add up to one are right). Rays leave surfaces with interpolated normals above their faces
 // (surface_point.h), where lines do not end: `direct` has all of theirs.
-#include <span>
 #include <vector>
 
 #include "integrators/paths/path.h"

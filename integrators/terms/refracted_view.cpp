@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "integrators/edges/flat_layers.h"
+#include "integrators/edges/flat_mirrors.h"
 #include "integrators/film/film_point.h"
 #include "integrators/terms/film_views.h"
 #include "integrators/terms/mirror_sight.h"

@@ -1,6 +1,6 @@
 #pragma once
 // Edges as the camera sees them through one flat refracting plane, or two parallel ones, which do
-// not cut its lens. The image of an edge is a curve: flat_layers.h finds where a point of the edge
+// not cut its lens. The image of an edge is a curve: direction_through() finds where a point of it
 // is seen, and how it moves follows from the camera's ray. With y the edge's point, d the direction
 // in which the ray through the film position s arrives there, x(s) where on it, and e the edge's
 // direction, it sees the edge where

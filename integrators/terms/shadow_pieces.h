@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "integrators/paths/path_context.h"
-#include "integrators/terms/upper_envelope.h"
+#include "integrators/terms/lifted_faces.h"
 #include "limn/core/face_tree.h"
 #include "limn/edgetree/edge_sampler.h"
 

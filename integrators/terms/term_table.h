@@ -2,7 +2,7 @@
 // The terms: a factory in a file of its own each, and one row. Included by term.cpp, and by the
 // terms for their factories.
 #include "integrators/terms/term.h"
-#include "limn/core/moved.h"
+#include "limn/core/parameter.h"
 
 namespace limn {
 

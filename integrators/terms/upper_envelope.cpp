@@ -1,5 +1,5 @@
 // Divides and conquers: the envelopes of both halves are merged from left to right.
-#include "integrators/terms/upper_envelope.h"
+#include "integrators/terms/lifted_faces.h"
 
 #include <algorithm>
 #include <limits>

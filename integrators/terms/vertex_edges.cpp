@@ -3,8 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <limits>
-
 namespace limn {
 
 bool is_unseen(const PathVertex& vertex) {

@@ -1,8 +1,6 @@
 // Formatting of errors and warnings.
 #include "limn/core/error.h"
 
-#include "limn/core/field_error.h"
-
 namespace limn {
 
 namespace {

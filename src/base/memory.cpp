@@ -1,4 +1,4 @@
-// Free memory, and the error for too large an allocation.
+// Free memory, the error for too large an allocation, and the peak of resident memory.
 #include "limn/core/memory.h"
 
 #include <sys/resource.h>
@@ -73,6 +73,14 @@ void require_memory(const SourceLocation& where, double bytes, const std::string
   if (bytes <= free) return;
   throw InputError(where, what + " takes " + in_gigabytes(bytes) + " of memory, and " +
                               in_gigabytes(free) + " are free: " + remedy);
+}
+
+void reset_peak_memory() {
+  std::ofstream("/proc/self/clear_refs") << "5";  // without it the peak is that of all runs so far
+}
+
+uint64_t peak_memory_bytes() {
+  return static_cast<uint64_t>(1024 * number_in("/proc/self/status", "VmHWM:", 0));
 }
 
 }  // namespace limn

@@ -3,7 +3,6 @@
 
 #include <cmath>
 
-#include "limn/core/advice.h"
 #include "limn/core/make_bsdf.h"
 #include "limn/core/names.h"
 #include "src/bsdf/types.h"

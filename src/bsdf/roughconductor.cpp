@@ -4,7 +4,6 @@
 #include <algorithm>
 
 #include "limn/core/make_bsdf.h"
-#include "limn/core/names.h"
 #include "src/bsdf/both_scalars.h"
 #include "src/bsdf/indices.h"
 #include "src/bsdf/microfacet_reflection.h"

@@ -17,6 +17,11 @@ double gaussian_floor(const Filter& f) {
   return std::exp(-f.radius * f.radius / (2 * f.stddev * f.stddev));
 }
 
+Film::Range range_around(double center, double begin, double end, bool unbounded, double radius) {
+  if (unbounded) return {-radius, radius};
+  return {std::max(-radius, begin - center), std::min(radius, end - center)};
+}
+
 }  // namespace
 
 double Filter::eval(double x) const {
@@ -117,15 +122,6 @@ double FilterTable::quantile(double lower, double upper, double u) const {
   for (int i = kNodes - 2; i >= 0; --i) x = c[i] + (t - at[i]) * x;
   return std::clamp(left ? x : -x, lower, upper);
 }
-
-namespace {
-
-Film::Range range_around(double center, double begin, double end, bool unbounded, double radius) {
-  if (unbounded) return {-radius, radius};
-  return {std::max(-radius, begin - center), std::min(radius, end - center)};
-}
-
-}  // namespace
 
 Film::Range Film::range_x(int pixel) const {
   return range_around(pixel + 0.5, crop_x, crop_x + crop_width, sample_border, filter.radius);

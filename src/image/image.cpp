@@ -20,7 +20,6 @@
 
 #include "limn/core/check.h"
 #include "limn/core/error.h"
-#include "limn/core/image_layers.h"
 #include "limn/core/memory.h"
 #include "limn/core/output_file.h"
 #include "src/image/formats.h"

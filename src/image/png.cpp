@@ -125,10 +125,6 @@ class PngReader {
   char text_[200] = "";
 };
 
-}  // namespace
-
-namespace {
-
 // All numbers of the file, bytes or floats.
 StoredImage decode(const std::string& file, std::string_view data, PngReader& reader,
                    bool keeps_alpha) {

@@ -6,7 +6,7 @@
 #include <fstream>
 
 #include "limn/core/error.h"
-#include "limn/core/image_alpha.h"
+#include "limn/core/image.h"
 #include "limn/core/memory.h"
 #include "src/base/text.h"
 #include "src/image/formats.h"
@@ -44,6 +44,16 @@ StoredImage stored(Image image) {
   StoredImage of{image.width, image.height, image.channels, false, {}, {}};
   of.floats = std::move(image.data);
   return of;
+}
+
+void check_floats(const std::vector<float>& floats, int width, int channels,
+                  const std::string& file, const std::string& what) {
+  const auto bad =
+      std::find_if_not(floats.begin(), floats.end(), [](float v) { return std::isfinite(v); });
+  if (bad == floats.end()) return;
+  const auto pixel = (bad - floats.begin()) / channels;
+  throw InputError({file}, what + "'s pixel (column " + std::to_string(pixel % width) + ", row " +
+                               std::to_string(pixel / width) + ") is not finite");
 }
 
 }  // namespace
@@ -99,20 +109,6 @@ Image read_alpha(const std::string& file) {
   if (!first.starts_with(kFormats[0].begins)) return {};
   return read_png_alpha(file, read_whole_file(file));
 }
-
-namespace {
-
-void check_floats(const std::vector<float>& floats, int width, int channels,
-                  const std::string& file, const std::string& what) {
-  const auto bad =
-      std::find_if_not(floats.begin(), floats.end(), [](float v) { return std::isfinite(v); });
-  if (bad == floats.end()) return;
-  const auto pixel = (bad - floats.begin()) / channels;
-  throw InputError({file}, what + "'s pixel (column " + std::to_string(pixel % width) + ", row " +
-                               std::to_string(pixel / width) + ") is not finite");
-}
-
-}  // namespace
 
 void check_finite(const StoredImage& image, const std::string& file, const std::string& what) {
   check_floats(image.floats, image.width, image.channels, file, what);

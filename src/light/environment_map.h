@@ -6,7 +6,6 @@
 #include <cmath>
 #include <optional>
 #include <variant>
-#include <vector>
 
 #include "limn/core/dual.h"
 #include "limn/core/environment.h"

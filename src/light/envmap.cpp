@@ -2,7 +2,7 @@
 #include <fmt/format.h>
 
 #include "limn/core/check.h"
-#include "limn/core/environment_map.h"
+#include "limn/core/environment.h"
 #include "src/light/environment_map.h"
 #include "src/light/types.h"
 

@@ -1,7 +1,7 @@
 // The table of emitter types, and helpers of their readers.
 #include <string>
 
-#include "limn/core/advice.h"
+#include "limn/core/names.h"
 #include "src/light/types.h"
 
 namespace limn {

@@ -1,5 +1,5 @@
 // Decompression; the only file that includes zlib.
-#include "src/mesh/inflate.h"
+#include "src/mesh/mesh_file.h"
 
 #include <zlib.h>
 

@@ -1,5 +1,5 @@
 // Light that faces hide from the smooth surface that interpolated normals describe.
-#include "src/mesh/lost_light.h"
+#include "src/mesh/mesh_build.h"
 
 #include <array>
 #include <cmath>

@@ -9,35 +9,8 @@
 #include "limn/core/tangent.h"
 #include "src/mesh/face_shape.h"
 #include "src/mesh/mesh_build.h"
-#include "src/mesh/shading_tangents.h"
 
 namespace limn {
-
-Vec3<Dual> Mesh::position(VertexId id) const {
-  const Vec3d p = cast<double>(positions[id.index()]);
-  if (position_tangents.empty()) return {p.x, p.y, p.z};
-  const Vec3<Lanes> t = position_tangents[id.index()];
-  return {{p.x, t.x}, {p.y, t.y}, {p.z, t.z}};
-}
-
-void weld_positions(Mesh& mesh) {
-  std::vector<uint32_t> order(mesh.positions.size());
-  std::iota(order.begin(), order.end(), 0);
-  const auto key = [&](uint32_t i) {
-    const Vec3f& p = mesh.positions[i];
-    return std::make_tuple(p.x, p.y, p.z);  // compares -0 equal to 0
-  };
-  std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
-    return std::make_pair(key(a), a) < std::make_pair(key(b), b);
-  });
-  mesh.weld.resize(order.size());
-  uint32_t root = 0;
-  for (size_t i = 0; i < order.size(); ++i) {
-    if (i == 0 || key(order[i]) != key(order[i - 1])) root = order[i];
-    mesh.weld[order[i]] = root;
-  }
-}
-
 namespace {
 
 template <class S>
@@ -99,6 +72,31 @@ std::vector<Vec3<S>> computed_normals(const Mesh& mesh, const std::vector<FaceSh
 
 }  // namespace
 
+Vec3<Dual> Mesh::position(VertexId id) const {
+  const Vec3d p = cast<double>(positions[id.index()]);
+  if (position_tangents.empty()) return {p.x, p.y, p.z};
+  const Vec3<Lanes> t = position_tangents[id.index()];
+  return {{p.x, t.x}, {p.y, t.y}, {p.z, t.z}};
+}
+
+void weld_positions(Mesh& mesh) {
+  std::vector<uint32_t> order(mesh.positions.size());
+  std::iota(order.begin(), order.end(), 0);
+  const auto key = [&](uint32_t i) {
+    const Vec3f& p = mesh.positions[i];
+    return std::make_tuple(p.x, p.y, p.z);  // compares -0 equal to 0
+  };
+  std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
+    return std::make_pair(key(a), a) < std::make_pair(key(b), b);
+  });
+  mesh.weld.resize(order.size());
+  uint32_t root = 0;
+  for (size_t i = 0; i < order.size(); ++i) {
+    if (i == 0 || key(order[i]) != key(order[i - 1])) root = order[i];
+    mesh.weld[order[i]] = root;
+  }
+}
+
 void update_shading_normals(Mesh& mesh) { fill_shading_normals(mesh); }
 
 size_t fill_shading_normals(Mesh& mesh) {
@@ -130,6 +128,23 @@ Bounds bounds_of(const Mesh& mesh) {
     for (uint32_t v : f) bounds.extend(cast<double>(mesh.positions[v]));
   }
   return bounds;
+}
+
+std::vector<Vec3d> displacement_directions(const Mesh& mesh) {
+  Mesh smooth;
+  smooth.positions = mesh.positions;
+  smooth.faces = mesh.faces;
+  smooth.weld = mesh.weld;
+  smooth.normal_source = NormalSource::kComputed;
+  update_shading_normals(smooth);
+  std::vector<Vec3d> of_root(mesh.positions.size()), directions;
+  for (size_t f = 0; f < mesh.faces.size(); ++f) {
+    for (int c = 0; c < 3; ++c) {
+      of_root[mesh.weld[mesh.faces[f][c]]] = smooth.normals[smooth.normal_ids[f][c]];
+    }
+  }
+  for (const uint32_t root : mesh.weld) directions.push_back(of_root[root]);
+  return directions;
 }
 
 }  // namespace limn

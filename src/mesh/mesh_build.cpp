@@ -7,8 +7,6 @@
 #include <cmath>
 #include <numeric>
 
-#include "src/mesh/lost_light.h"
-
 namespace limn {
 
 namespace {

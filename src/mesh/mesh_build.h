@@ -58,4 +58,14 @@ bool mirrors(const Matrix4& to_world);
 // kLargestCoordinate.
 Mesh build_mesh(const RawMesh& raw, const MeshOptions& options, std::vector<std::string>* warnings);
 
+// The share of a uniform light that the outside of a mesh loses because faces are flat: of the
+// directions above the smooth surface, in the cosine measure, those that lie below the face and
+// meet it again from where rays start (limn/core/surface_lift.h). 0 where normals are the faces'.
+// The mean over the area, but for points whose shading normal opposes the face.
+double lost_light(const Mesh& mesh);
+
+// Updates normal_tangents of computed normals after a change of position_tangents; the rest must be
+// up to date. Empty if all vertices move alike.
+void update_shading_tangents(Mesh& mesh);
+
 }  // namespace limn

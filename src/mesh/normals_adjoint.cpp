@@ -37,6 +37,32 @@ class FacesAround {
 
 bool is_zero(const Vec3d& v) { return v.x == 0 && v.y == 0 && v.z == 0; }
 
+// With sides a, b, c and the doubled area |D|, D = a x b, the angles are those of (q, |D|) for q =
+// a.b, -a.c, b.c.
+void pull_back_face(const Mesh& mesh, const std::array<uint32_t, 3>& roots,
+                    const FaceShape<double>& shape, const FaceAdjoint& adjoint,
+                    std::vector<Vec3d>& positions) {
+  std::array<Vec3d, 3> p;
+  for (int k = 0; k < 3; ++k) p[k] = cast<double>(mesh.positions[roots[k]]);
+  const Vec3d a = p[1] - p[0], b = p[2] - p[0], c = p[2] - p[1];
+  const double size = length(cross(a, b));
+  const double q[3] = {dot(a, b), -dot(a, c), dot(b, c)};
+  double of_q[3], of_size = 0;
+  for (int k = 0; k < 3; ++k) {
+    const double scale = adjoint.angles[k] / (size * size + q[k] * q[k]);
+    of_size += scale * q[k];
+    of_q[k] = -scale * size;
+  }
+  const Vec3d across = adjoint.normal - shape.normal * dot(shape.normal, adjoint.normal);
+  const Vec3d of_d = across / size + shape.normal * of_size;
+  const Vec3d of_a = cross(b, of_d) + b * of_q[0] - c * of_q[1];
+  const Vec3d of_b = cross(of_d, a) + a * of_q[0] + c * of_q[2];
+  const Vec3d of_c = b * of_q[2] - a * of_q[1];
+  positions[roots[0]] += -of_a - of_b;
+  positions[roots[1]] += of_a - of_c;
+  positions[roots[2]] += of_b + of_c;
+}
+
 }  // namespace
 
 struct ShadingNormalsAdjoint::OfMesh {
@@ -108,36 +134,6 @@ std::vector<uint32_t> ShadingNormalsAdjoint::OfMesh::touched(
   }
   return list;
 }
-
-namespace {
-
-// With sides a, b, c and the doubled area |D|, D = a x b, the angles are those of (q, |D|) for q =
-// a.b, -a.c, b.c.
-void pull_back_face(const Mesh& mesh, const std::array<uint32_t, 3>& roots,
-                    const FaceShape<double>& shape, const FaceAdjoint& adjoint,
-                    std::vector<Vec3d>& positions) {
-  std::array<Vec3d, 3> p;
-  for (int k = 0; k < 3; ++k) p[k] = cast<double>(mesh.positions[roots[k]]);
-  const Vec3d a = p[1] - p[0], b = p[2] - p[0], c = p[2] - p[1];
-  const double size = length(cross(a, b));
-  const double q[3] = {dot(a, b), -dot(a, c), dot(b, c)};
-  double of_q[3], of_size = 0;
-  for (int k = 0; k < 3; ++k) {
-    const double scale = adjoint.angles[k] / (size * size + q[k] * q[k]);
-    of_size += scale * q[k];
-    of_q[k] = -scale * size;
-  }
-  const Vec3d across = adjoint.normal - shape.normal * dot(shape.normal, adjoint.normal);
-  const Vec3d of_d = across / size + shape.normal * of_size;
-  const Vec3d of_a = cross(b, of_d) + b * of_q[0] - c * of_q[1];
-  const Vec3d of_b = cross(of_d, a) + a * of_q[0] + c * of_q[2];
-  const Vec3d of_c = b * of_q[2] - a * of_q[1];
-  positions[roots[0]] += -of_a - of_b;
-  positions[roots[1]] += of_a - of_c;
-  positions[roots[2]] += of_b + of_c;
-}
-
-}  // namespace
 
 ShadingNormalsAdjoint::ShadingNormalsAdjoint(const Mesh& mesh)
     : of_mesh_(mesh.normal_source == NormalSource::kComputed ? std::make_unique<OfMesh>(mesh)

@@ -1,5 +1,5 @@
 // Triangulation of polygons: fans, bisection, or ear clipping.
-#include "src/mesh/polygon.h"
+#include "src/mesh/mesh_file.h"
 
 #include <algorithm>
 #include <cmath>

@@ -16,7 +16,6 @@
 #include "limn/core/names.h"
 #include "src/base/text.h"
 #include "src/mesh/mesh_file.h"
-#include "src/mesh/polygon.h"
 
 namespace limn {
 

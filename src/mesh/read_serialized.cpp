@@ -8,7 +8,6 @@
 
 #include "limn/core/memory.h"
 #include "src/base/text.h"
-#include "src/mesh/inflate.h"
 #include "src/mesh/mesh_file.h"
 
 namespace limn {

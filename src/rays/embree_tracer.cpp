@@ -15,11 +15,11 @@
 #include <type_traits>
 
 #include "limn/core/blur_tracer.h"
+#include "limn/core/box_tree.h"
 #include "limn/core/check.h"
-#include "limn/core/coincident_faces.h"
 #include "limn/core/error.h"
 #include "limn/core/exposure.h"
-#include "limn/core/oriented_boxes.h"
+#include "limn/core/face_overlaps.h"
 #include "limn/core/parallel.h"
 #include "limn/core/ray_tracer.h"
 #include "limn/core/touch.h"

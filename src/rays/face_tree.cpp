@@ -19,6 +19,15 @@ float middle(const FaceTree::Item& item, int axis) {
   return item.corners[0][axis] + item.corners[1][axis] + item.corners[2][axis];
 }
 
+// A side of an item, identified by the positions of its ends.
+struct ItemSide {
+  Vec3f low, high;
+  uint32_t item;
+  uint8_t side;
+  bool forward;
+  auto ends() const { return std::tie(low.x, low.y, low.z, high.x, high.y, high.z); }
+};
+
 }  // namespace
 
 FaceTree::FaceTree(const Scene& scene) {
@@ -35,19 +44,6 @@ FaceTree::FaceTree(const Scene& scene) {
   if (!items_.empty()) build(0, static_cast<uint32_t>(items_.size()));
   find_neighbours();
 }
-
-namespace {
-
-// A side of an item, identified by the positions of its ends.
-struct ItemSide {
-  Vec3f low, high;
-  uint32_t item;
-  uint8_t side;
-  bool forward;
-  auto ends() const { return std::tie(low.x, low.y, low.z, high.x, high.y, high.z); }
-};
-
-}  // namespace
 
 void FaceTree::find_neighbours() {
   std::vector<ItemSide> sides;

@@ -1,5 +1,5 @@
 // First hits of rays that a caller gives.
-#include "limn/core/first_hits.h"
+#include "limn/core/ray_tracer.h"
 
 #include "limn/core/error.h"
 #include "limn/core/parallel.h"

@@ -1,5 +1,5 @@
 // Boxes along the sides of faces.
-#include "limn/core/oriented_boxes.h"
+#include "limn/core/box_tree.h"
 
 #include <algorithm>
 #include <cmath>

@@ -4,7 +4,6 @@
 
 #include "limn/core/exposure.h"
 #include "src/scene/motion.h"
-#include "src/scene/motion_lists.h"
 
 namespace limn {
 

@@ -6,7 +6,6 @@
 #include "limn/core/error.h"
 #include "limn/core/exposure.h"
 #include "src/scene/motion.h"
-#include "src/scene/motion_lists.h"
 
 namespace limn {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "limn/core/error.h"
 #include "limn/core/exposure.h"
-#include "limn/core/image_alpha.h"
+#include "limn/core/image.h"
 #include "limn/core/make_bsdf.h"
 
 namespace limn {

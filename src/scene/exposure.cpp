@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
-#include "limn/core/coincident_faces.h"
 #include "limn/core/error.h"
+#include "limn/core/face_overlaps.h"
 #include "src/scene/rotation.h"
 
 namespace limn {

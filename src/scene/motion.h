@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "limn/core/moved.h"
 #include "limn/core/parameter.h"
 
 namespace limn {
@@ -51,5 +50,12 @@ Vec3d unit_vector(int axis);
 Vec3d turned(const Vec3d& v, int axis, double angle);
 // The diagonal of the bounds of all shapes; 1 if there is none.
 double scene_size(const Scene& scene);
+
+void add_shape_parameters(const Scene& scene, std::vector<Parameter>& list);    // shape_motion.cpp
+void add_camera_parameters(const Scene& scene, std::vector<Parameter>& list);   // camera_motion.cpp
+void add_course_parameters(const Scene& scene, std::vector<Parameter>& list);   // course_motion.cpp
+void add_bsdf_parameters(const Scene& scene, std::vector<Parameter>& list);     // value_motion.cpp
+void add_emitter_parameters(const Scene& scene, std::vector<Parameter>& list);  // value_motion.cpp
+void add_texel_parameters(const Scene& scene, std::vector<Parameter>& list);    // texel_motion.cpp
 
 }  // namespace limn

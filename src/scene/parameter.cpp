@@ -7,11 +7,8 @@
 #include <cmath>
 
 #include "limn/core/check.h"
-#include "limn/core/moved.h"
 #include "limn/core/names.h"
-#include "limn/core/nearest_names.h"
 #include "src/scene/motion.h"
-#include "src/scene/motion_lists.h"
 
 namespace limn {
 

@@ -3,7 +3,6 @@
 
 #include "limn/core/exposure.h"
 #include "limn/core/mesh_attribute.h"
-#include "limn/core/set_shading.h"
 
 namespace limn {
 

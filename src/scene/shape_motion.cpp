@@ -3,12 +3,11 @@
 #include <utility>
 
 #include "limn/core/check.h"
-#include "limn/core/displacement.h"
 #include "limn/core/exposure.h"
+#include "limn/core/mesh.h"
 #include "src/base/text.h"
-#include "src/mesh/shading_tangents.h"
+#include "src/mesh/mesh_build.h"
 #include "src/scene/motion.h"
-#include "src/scene/motion_lists.h"
 
 namespace limn {
 

@@ -11,7 +11,6 @@
 #include "limn/core/mesh_attribute.h"
 #include "src/base/text.h"
 #include "src/scene/motion.h"
-#include "src/scene/motion_lists.h"
 
 namespace limn {
 
@@ -159,16 +158,6 @@ class TexelArray final : public TexelMotion {
   }
 };
 
-}  // namespace
-
-Parameter texel_field(const Scene& scene, const Parameter& texels, const Image& field) {
-  const TexelMap::Map map = texels.texel_map(scene)->map();
-  CHECK_EQ(field.data.size(), 3 * static_cast<size_t>(map.width) * map.height);
-  return dynamic_cast<const TexelArray&>(*texels.motion).field(texels, field);
-}
-
-namespace {
-
 void add_map(const Scene& scene, const Texels& texels, std::vector<Parameter>& list) {
   const TexelMap::Map map = texels.in(scene).map();
   if (map.width == 0) return;
@@ -195,6 +184,12 @@ void add_texels_of_shape(const Scene& scene, size_t s, std::vector<Parameter>& l
 }
 
 }  // namespace
+
+Parameter texel_field(const Scene& scene, const Parameter& texels, const Image& field) {
+  const TexelMap::Map map = texels.texel_map(scene)->map();
+  CHECK_EQ(field.data.size(), 3 * static_cast<size_t>(map.width) * map.height);
+  return dynamic_cast<const TexelArray&>(*texels.motion).field(texels, field);
+}
 
 void add_texel_parameters(const Scene& scene, std::vector<Parameter>& list) {
   for (size_t s = 0; s < scene.shapes.size(); ++s) add_texels_of_shape(scene, s, list);

@@ -5,7 +5,6 @@
 
 #include "limn/core/framed_light.h"
 #include "src/scene/motion.h"
-#include "src/scene/motion_lists.h"
 
 namespace limn {
 

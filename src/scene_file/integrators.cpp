@@ -1,9 +1,8 @@
 // The table of integrator types that are read as paths.
-#include "src/scene_file/integrators.h"
+#include "src/scene_file/scene_sensor.h"
 
 #include <algorithm>
 
-#include "limn/core/advice.h"
 #include "limn/core/names.h"
 
 namespace limn {

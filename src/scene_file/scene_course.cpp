@@ -1,5 +1,5 @@
 // Keyframes from transforms.
-#include "src/scene_file/scene_course.h"
+#include "src/scene_file/scene_sensor.h"
 
 #include <algorithm>
 #include <cmath>

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <set>
 
-#include "limn/core/advice.h"
 #include "limn/core/names.h"
 
 namespace limn {

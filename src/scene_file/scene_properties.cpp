@@ -5,7 +5,6 @@
 
 #include "limn/core/names.h"
 #include "src/scene_file/scene_tree.h"
-#include "src/scene_file/spectrum_objects.h"
 
 namespace limn {
 

@@ -84,4 +84,10 @@ class DescribedProperties final : public Properties {
   std::set<std::string> known_tags_;
 };
 
+// True for uniform, rawconstant, srgb, d65, regular, irregular and blackbody.
+bool is_spectrum_type(const std::string& type);
+
+// The colour of such an object. InputError for unknown, missing or unusable parameters.
+Rgb<double> read_spectrum_object(DescribedProperties& properties, ColourUse use);
+
 }  // namespace limn

@@ -5,11 +5,9 @@
 #include <cmath>
 #include <limits>
 
-#include "limn/core/advice.h"
 #include "limn/core/memory.h"
 #include "limn/core/names.h"
 #include "src/base/text.h"
-#include "src/scene_file/scene_course.h"
 
 namespace limn {
 

@@ -1,5 +1,5 @@
 #pragma once
-// Sensor, film, reconstruction filter and sampler of a scene file.
+// Integrator, sensor, film, filter, sampler, shutter and animations of a scene file.
 #include "limn/core/exposure.h"
 #include "limn/core/scene.h"
 #include "src/scene_file/scene_properties.h"
@@ -19,5 +19,20 @@ struct SharedParts {
 Sensor read_sensor(const ObjectDescription& sensor, const SceneDescription& description,
                    Exposure& exposure, std::vector<std::string>& warnings,
                    const SharedParts& shared = {});
+
+// Reads depths and hide_emitters into `scene`. Parameters that change how Mitsuba samples, not
+// what, are ignored. InputError for other types. Appends whole lines to `warnings`.
+void read_integrator(const ObjectDescription& object, const SceneDescription& description,
+                     Scene& scene, std::vector<std::string>& warnings);
+
+// The middle of the shutter of the first sensor; 0 without one.
+double reference_time(const SceneDescription& description);
+
+// shutter_open and shutter_close. InputError if it closes before it opens.
+Shutter read_shutter(Properties& properties);
+
+// to_world at a time: of a transform or an animation, whose keyframes `course` gets. These must
+// differ by rotations, translations and uniform scales alone; else InputError at a keyframe.
+Matrix4 read_course(DescribedProperties& properties, double time, Course& course);
 
 }  // namespace limn

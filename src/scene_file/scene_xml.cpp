@@ -8,7 +8,6 @@
 #include <optional>
 #include <stdexcept>
 
-#include "limn/core/advice.h"
 #include "limn/core/face_overlaps.h"
 #include "limn/core/make_bsdf.h"
 #include "limn/core/memory.h"
@@ -19,8 +18,6 @@
 #include "src/mesh/mesh_build.h"
 #include "src/mesh/mesh_file.h"
 #include "src/mesh/shapes.h"
-#include "src/scene_file/integrators.h"
-#include "src/scene_file/scene_course.h"
 #include "src/scene_file/scene_properties.h"
 #include "src/scene_file/scene_sensor.h"
 

@@ -1,5 +1,5 @@
 // Reads spectra that are objects.
-#include "src/scene_file/spectrum_objects.h"
+#include "src/scene_file/scene_properties.h"
 
 #include <cmath>
 

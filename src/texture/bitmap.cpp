@@ -7,8 +7,8 @@
 
 #include "limn/core/image.h"
 #include "limn/core/names.h"
-#include "src/texture/grid_lines.h"
 #include "src/texture/texels.h"
+#include "src/texture/types.h"
 
 namespace limn {
 namespace {

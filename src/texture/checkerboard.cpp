@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "src/texture/grid_lines.h"
+#include "src/texture/types.h"
 
 namespace limn {
 namespace {

@@ -1,5 +1,5 @@
 // Lines of a grid on a face.
-#include "src/texture/grid_lines.h"
+#include "src/texture/types.h"
 
 #include <algorithm>
 #include <cmath>

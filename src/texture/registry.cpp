@@ -3,7 +3,6 @@
 
 #include <cmath>
 
-#include "limn/core/advice.h"
 #include "limn/core/image.h"
 #include "limn/core/names.h"
 #include "src/texture/types.h"

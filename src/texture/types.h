@@ -31,4 +31,9 @@ struct UvTransform {
 // Reads to_uv: a transform of (u, v, 0), as in Mitsuba.
 UvTransform read_to_uv(Properties& properties);
 
+// As Texture::add_discontinuities: where a coordinate of to_uv is a multiple of 1 / per_unit.
+bool add_grid_lines(const std::array<std::array<double, 2>, 3>& uv, const UvTransform& to_uv,
+                    const std::array<int, 2>& per_unit, size_t most,
+                    Texture::Discontinuities& lines);
+
 }  // namespace limn

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numeric>
 
 #include "limn/core/parameter.h"
 #include "limn/integrators/backward.h"

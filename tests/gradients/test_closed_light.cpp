@@ -8,7 +8,6 @@
 #include <algorithm>
 
 #include "integrators/edges/scene_edges.h"
-#include "limn/core/error.h"
 #include "limn/core/parameter.h"
 #include "limn/integrators/gradient.h"
 #include "limn/integrators/methods.h"

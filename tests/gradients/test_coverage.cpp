@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "limn/core/error.h"
-#include "limn/core/image_alpha.h"
+#include "limn/core/image.h"
 #include "limn/core/parameter.h"
 #include "limn/integrators/backward.h"
 #include "limn/integrators/gradient.h"

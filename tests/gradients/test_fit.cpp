@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "integrators/fit/optimiser.h"
+#include "integrators/fit/quasi_newton.h"
 #include "integrators/fit/surface_tree.h"
 #include "limn/core/error.h"
 #include "limn/core/parameter.h"

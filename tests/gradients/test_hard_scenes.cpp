@@ -3,8 +3,6 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include <functional>
-
 #include "limn/integrators/gradient.h"
 #include "limn/integrators/render.h"
 #include "support/block_runs.h"

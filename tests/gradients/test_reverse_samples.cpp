@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "integrators/estimates/peak_memory.h"
 #include "limn/core/error.h"
 #include "limn/core/image.h"
+#include "limn/core/memory.h"
 #include "limn/core/rng.h"
 #include "limn/integrators/backward.h"
 #include "limn/integrators/render.h"

@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "edgetree/forest/forest_build.h"
-#include "integrators/edges/face_discontinuities.h"
 #include "integrators/edges/texture_discontinuities.h"
 #include "limn/core/image.h"
 #include "limn/core/rng.h"

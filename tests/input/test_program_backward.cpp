@@ -1,5 +1,4 @@
 // `limn backward` as a user meets it: single samples, reports of outliers.
-#include <cmath>
 
 #include "support/program.h"
 

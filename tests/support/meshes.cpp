@@ -188,12 +188,6 @@ Mesh transformed(const Mesh& mesh, const Vec3d (&rows)[3], double scale, const V
   return moved;
 }
 
-Vec3d random_direction(Rng& rng) {
-  const double z = 2 * rng.uniform() - 1, phi = 2 * kPi * rng.uniform();
-  const double r = std::sqrt(1 - z * z);
-  return {r * std::cos(phi), r * std::sin(phi), z};
-}
-
 void random_rotation(Rng& rng, Vec3d (&rows)[3]) {
   const Vec3d n = random_direction(rng);
   const Vec3d s = normalize(cross(n, random_direction(rng)));

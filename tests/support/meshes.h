@@ -4,6 +4,7 @@
 
 #include "limn/core/mesh.h"
 #include "limn/core/rng.h"
+#include "limn/edgetree/rejection.h"
 
 namespace limn {
 
@@ -34,7 +35,6 @@ Mesh with_smooth_normals(Mesh mesh);
 // turn along.
 Mesh transformed(const Mesh& mesh, const Vec3d (&rows)[3], double scale, const Vec3d& offset);
 void random_rotation(Rng& rng, Vec3d (&rows)[3]);
-Vec3d random_direction(Rng& rng);
 
 // Lane 0: translation along x; lane 1: rotation about z; lane 2: every vertex on its own; lane 3:
 // nothing.

@@ -1,6 +1,5 @@
 #pragma once
 // Small scenes for tests: XML put together from parts, and meshes written to files.
-#include <map>
 #include <string>
 
 #include "limn/core/mesh.h"

@@ -7,7 +7,7 @@
 
 #include <functional>
 
-#include "limn/core/environment_map.h"
+#include "limn/core/environment.h"
 #include "limn/core/error.h"
 #include "limn/core/rng.h"
 #include "limn/integrators/backward.h"

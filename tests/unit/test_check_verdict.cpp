@@ -5,11 +5,10 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "integrators/compare/check_bend.h"
-#include "integrators/compare/check_samples.h"
+#include "integrators/compare/check_step.h"
 #include "integrators/compare/edge_events.h"
 #include "integrators/methods/hair_gaps.h"
-#include "limn/core/field_error.h"
+#include "limn/core/error.h"
 #include "limn/core/image.h"
 #include "limn/core/rng.h"
 #include "limn/integrators/backward.h"

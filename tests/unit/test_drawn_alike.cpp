@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "limn/core/bsdf.h"
-#include "limn/core/environment_map.h"
+#include "limn/core/environment.h"
 #include "limn/core/parameter.h"
 #include "limn/core/rng.h"
 #include "limn/core/surface_point.h"

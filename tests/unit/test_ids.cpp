@@ -1,7 +1,6 @@
 // Ids of different kinds do not mix.
 #include <gtest/gtest.h>
 
-#include <concepts>
 #include <type_traits>
 
 #include "limn/edgetree/edge_sampler.h"

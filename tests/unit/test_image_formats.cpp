@@ -1,7 +1,6 @@
 // Images of the formats that are told apart by their first bytes, and files that are none.
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <filesystem>
 
 #include "limn/core/error.h"

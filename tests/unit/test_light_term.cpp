@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <limits>
 
 #include "edgetree/light/light_term.h"
 #include "limn/core/rng.h"

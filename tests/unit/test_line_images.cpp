@@ -5,7 +5,6 @@
 #include "integrators/contours/line_light.h"
 #include "limn/core/error.h"
 #include "limn/integrators/compare.h"
-#include "limn/integrators/compare_images.h"
 #include "support/over_floor.h"
 #include "support/running_mean.h"
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <set>
 
-#include "limn/core/field_error.h"
+#include "limn/core/error.h"
 #include "limn/integrators/fit_options.h"
 #include "limn/integrators/options.h"
 

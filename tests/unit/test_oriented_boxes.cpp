@@ -1,5 +1,4 @@
 // Boxes along the sides of faces, and what they spare a search for pairs.
-#include "limn/core/oriented_boxes.h"
 
 #include <gtest/gtest.h>
 

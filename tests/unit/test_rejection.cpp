@@ -7,13 +7,11 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <numeric>
 
 #include "../support/meshes.h"
 #include "../support/test_names.h"
 #include "edgetree/forest/edge_forest.h"
 #include "limn/edgetree/edge_sampler_types.h"
-#include "limn/edgetree/rejection_places.h"
 
 namespace limn {
 namespace {

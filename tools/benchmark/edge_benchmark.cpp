@@ -1,7 +1,6 @@
 // Measures edge samplers, all rows of their table: hit rate (the share of draws that end on an edge
 // of E(p)), cost of a draw, time of the build. One table to standard output; seeds are fixed.
-//   edge_benchmark [MESH.obj|MESH.ply ...] [--only SAMPLER ...]
-// Without meshes: on tori of 1k to 1M edges, the default sampler if none is named.
+//   edge_benchmark MESH.obj|MESH.ply ... [--only SAMPLER ...]
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -16,7 +15,6 @@
 #include "limn/core/error.h"
 #include "limn/core/make_bsdf.h"
 #include "limn/core/mesh.h"
-#include "limn/core/names.h"
 #include "limn/core/parallel.h"
 #include "limn/core/ray_tracer.h"
 #include "limn/edgetree/contribution_bound.h"
@@ -40,58 +38,20 @@ class Stopwatch {
   std::clock_t start_ = std::clock();
 };
 
-// A torus with bumps, about 6 tube^2 edges.
-Mesh bumpy_torus(int tube) {
-  Mesh mesh;
-  const int around = 2 * tube;
-  const auto id = [&](int i, int j) {
-    return static_cast<uint32_t>((i % around) * tube + j % tube);
-  };
-  for (int i = 0; i < around; ++i)
-    for (int j = 0; j < tube; ++j) {
-      const double u = 2 * kPi * i / around, v = 2 * kPi * j / tube;
-      const double small = 0.4 + 0.03 * std::sin(7 * u) * std::cos(5 * v);
-      const double r = 1 + small * std::cos(v);
-      mesh.positions.push_back(
-          cast<float>(Vec3d{r * std::cos(u), r * std::sin(u), small * std::sin(v)}));
-      mesh.faces.push_back({id(i, j), id(i + 1, j), id(i + 1, j + 1)});
-      mesh.faces.push_back({id(i, j), id(i + 1, j + 1), id(i, j + 1)});
-    }
-  weld_positions(mesh);
-  return mesh;
-}
-
 Mesh smoothed(Mesh mesh) {
   mesh.normal_source = NormalSource::kComputed;
   update_shading_normals(mesh);
   return mesh;
 }
 
-Vec3d random_direction(Rng& rng) {
-  const double z = 2 * rng.uniform() - 1, phi = 2 * kPi * rng.uniform();
-  const double r = std::sqrt(1 - z * z);
-  return {r * std::cos(phi), r * std::sin(phi), z};
-}
-
-// Points at 1.5 times the bounding radius that look at the mesh and move.
-std::vector<EdgeQuery> queries_around(const Mesh& mesh, int count, const LobeSummary& lobe) {
-  Rng rng(1, 0, 0);
-  const Bounds bounds = bounds_of(mesh);
-  double radius = 0;
-  for (const Vec3f& x : mesh.positions)
-    radius = std::max(radius, length(cast<double>(x) - bounds.center()));
-  std::vector<EdgeQuery> queries;
-  for (int i = 0; i < count; ++i) {
-    const Vec3d d = random_direction(rng);
-    EdgeQuery q;
-    q.p = bounds.center() + d * (1.5 * radius);
-    q.n = -d;
+// Points around the mesh that look at it from all sides and move.
+std::vector<EdgeQuery> queries_with(const EdgeMesh& mesh, const LobeSummary& lobe) {
+  Rng rng(1, 1, 0);
+  std::vector<EdgeQuery> queries = queries_around(mesh, 500, 1);
+  for (EdgeQuery& q : queries) {
     do q.wi = random_direction(rng);
     while (dot(q.wi, q.n) < 0.2);
     q.lobe = lobe;
-    const Vec3d v = random_direction(rng);
-    for (int k = 0; k < 3; ++k) q.velocity[k][0] = v[k];
-    queries.push_back(q);
   }
   return queries;
 }
@@ -141,15 +101,6 @@ double tests_per_silhouette(const EdgeSamplerInput& input, const EdgeSampler& sa
   uint64_t tests = 0;
   for (const DepthCounts& depth : counts.by_depth) tests += depth.tested;
   return static_cast<double>(tests) / static_cast<double>(counts.silhouettes);
-}
-
-// The rows that are named, which may carry settings; `otherwise` if none is.
-std::vector<EdgeSamplerType> rows_of(const std::vector<std::string>& only,
-                                     std::span<const EdgeSamplerType> otherwise) {
-  if (only.empty()) return {otherwise.begin(), otherwise.end()};
-  std::vector<EdgeSamplerType> rows;
-  for (const std::string& name : only) rows.push_back(edge_sampler_type(name));
-  return rows;
 }
 
 double ray_nanoseconds(const Mesh& mesh) {
@@ -242,8 +193,8 @@ void measure(const std::string& name, const Mesh& mesh, std::span<const EdgeSamp
   std::vector<Row> rows;
   for (const EdgeSamplerType& type : types) rows.push_back({type});
   build(rows, input);
-  const auto queries = queries_around(mesh, 500, {});
-  const auto glossy = queries_around(mesh, 500, {ggx_lobe(), 0.1, 1});
+  const auto queries = queries_with(edges, {});
+  const auto glossy = queries_with(edges, {ggx_lobe(), 0.1, 1});
   measure_draws(rows, queries, glossy);
   print_draws(rows, input, queries, glossy);
 }
@@ -253,21 +204,19 @@ void measure(const std::string& name, const Mesh& mesh, std::span<const EdgeSamp
 
 int main(int argc, char** argv) try {
   using namespace limn;
-  std::vector<std::string> files, only;
+  std::vector<std::string> files;
+  std::vector<EdgeSamplerType> rows;
   for (int i = 1; i < argc; ++i) {
     const std::string word = argv[i];
     if (word == "--only" && i + 1 < argc)
-      only.push_back(argv[++i]);
+      rows.push_back(edge_sampler_type(argv[++i]));
     else
       files.push_back(word);
   }
-  const auto rows =
-      rows_of(only, files.empty() ? edge_sampler_types().first(1) : edge_sampler_types());
+  if (files.empty()) throw InputError("needs a mesh");
+  if (rows.empty()) rows.assign(edge_sampler_types().begin(), edge_sampler_types().end());
   for (const std::string& file : files)
     measure(file.substr(file.find_last_of('/') + 1), smoothed(read_mesh(file, false)), rows);
-  if (!files.empty()) return 0;
-  for (int tube : {13, 41, 129, 408})
-    measure(fmt::format("torus {}", tube), smoothed(bumpy_torus(tube)), rows);
 } catch (const std::exception& error) {
   fmt::print(stderr, "edge_benchmark: {}\n", error.what());
   return 2;

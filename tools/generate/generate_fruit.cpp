@@ -28,6 +28,49 @@ Rgb<double> mixed(const Rgb<double>& a, const Rgb<double>& b, double t) {
   return a * (1 - t) + b * t;
 }
 
+struct Grape {
+  Vec3d center;
+  double radius;
+};
+
+// The height at which a ball comes to rest at (x, z) on those that lie there and on the ground.
+double resting_height(const std::vector<Grape>& heap, double x, double z, double radius) {
+  constexpr double kGap = 1.02;  // so that they do not touch
+  double height = radius;
+  for (const Grape& other : heap) {
+    const double reach = kGap * (radius + other.radius);
+    const double apart = std::hypot(x - other.center.x, z - other.center.z);
+    if (apart < reach) {
+      height = std::max(height, other.center.y + std::sqrt(reach * reach - apart * apart));
+    }
+  }
+  return height;
+}
+
+// Grapes of a bunch that lies on the ground: each where, of many places tried, it comes to rest
+// lowest.
+std::vector<Grape> heap_of_grapes(int count) {
+  std::vector<Grape> heap;
+  for (int i = 0; i < count; ++i) {
+    const double radius = 0.17 + 0.012 * noise({0.5, 0.5, 1.7 * i});
+    Grape best{{0, 1e9, 0}, radius};
+    for (int k = 0; k < 400; ++k) {
+      // Even over an ellipse, by steps of the golden angle; each grape tries other places.
+      const double r = std::sqrt((k + 0.5) / 400);
+      const double a = (k + 0.37 * i) * kPi * (3 - std::sqrt(5.0));
+      const double x = 0.86 * r * std::cos(a), z = 0.48 * r * std::sin(a);
+      const double lean = 0.06 * (x * x + 3 * z * z);  // The bunch is higher in its middle.
+      const double y = resting_height(heap, x, z, radius);
+      if (y + lean < best.center.y + 0.06 * (best.center.x * best.center.x +
+                                             3 * best.center.z * best.center.z)) {
+        best.center = {x, y, z};
+      }
+    }
+    heap.push_back(best);
+  }
+  return heap;
+}
+
 }  // namespace
 
 Triangles make_orange(int faces) {
@@ -95,53 +138,6 @@ Triangles make_pear(int faces) {
   });
   return mesh;
 }
-
-namespace {
-
-struct Grape {
-  Vec3d center;
-  double radius;
-};
-
-// The height at which a ball comes to rest at (x, z) on those that lie there and on the ground.
-double resting_height(const std::vector<Grape>& heap, double x, double z, double radius) {
-  constexpr double kGap = 1.02;  // so that they do not touch
-  double height = radius;
-  for (const Grape& other : heap) {
-    const double reach = kGap * (radius + other.radius);
-    const double apart = std::hypot(x - other.center.x, z - other.center.z);
-    if (apart < reach) {
-      height = std::max(height, other.center.y + std::sqrt(reach * reach - apart * apart));
-    }
-  }
-  return height;
-}
-
-// Grapes of a bunch that lies on the ground: each where, of many places tried, it comes to rest
-// lowest.
-std::vector<Grape> heap_of_grapes(int count) {
-  std::vector<Grape> heap;
-  for (int i = 0; i < count; ++i) {
-    const double radius = 0.17 + 0.012 * noise({0.5, 0.5, 1.7 * i});
-    Grape best{{0, 1e9, 0}, radius};
-    for (int k = 0; k < 400; ++k) {
-      // Even over an ellipse, by steps of the golden angle; each grape tries other places.
-      const double r = std::sqrt((k + 0.5) / 400);
-      const double a = (k + 0.37 * i) * kPi * (3 - std::sqrt(5.0));
-      const double x = 0.86 * r * std::cos(a), z = 0.48 * r * std::sin(a);
-      const double lean = 0.06 * (x * x + 3 * z * z);  // The bunch is higher in its middle.
-      const double y = resting_height(heap, x, z, radius);
-      if (y + lean < best.center.y + 0.06 * (best.center.x * best.center.x +
-                                             3 * best.center.z * best.center.z)) {
-        best.center = {x, y, z};
-      }
-    }
-    heap.push_back(best);
-  }
-  return heap;
-}
-
-}  // namespace
 
 Triangles make_grapes(int faces) {
   const std::vector<Grape> heap = heap_of_grapes(34);

@@ -90,6 +90,18 @@ void join_rings(Triangles& mesh, uint32_t a, bool a_is_point, uint32_t b, bool b
   }
 }
 
+// A random number in [-1, 1] for a point of the lattice: the finalizer of SplitMix64 over its
+// coordinates.
+double lattice_number(int64_t x, int64_t y, int64_t z) {
+  uint64_t bits = static_cast<uint64_t>(x) * 0x9e3779b97f4a7c15u +
+                  static_cast<uint64_t>(y) * 0xc2b2ae3d27d4eb4fu +
+                  static_cast<uint64_t>(z) * 0x165667b19e3779f9u;
+  bits = (bits ^ (bits >> 30)) * 0xbf58476d1ce4e5b9u;
+  bits = (bits ^ (bits >> 27)) * 0x94d049bb133111ebu;
+  bits ^= bits >> 31;
+  return static_cast<double>(bits >> 11) / static_cast<double>(uint64_t{1} << 52) - 1;
+}
+
 }  // namespace
 
 Triangles sweep(const std::vector<Ring>& rings, int sides) {
@@ -225,22 +237,6 @@ Triangles torus(const Vec3d& center, const Vec3d& axis, double radius, double tu
   }
   return closed_sweep(rings, steps(2 * kPi * tube_radius, h, 6));
 }
-
-namespace {
-
-// A random number in [-1, 1] for a point of the lattice: the finalizer of SplitMix64 over its
-// coordinates.
-double lattice_number(int64_t x, int64_t y, int64_t z) {
-  uint64_t bits = static_cast<uint64_t>(x) * 0x9e3779b97f4a7c15u +
-                  static_cast<uint64_t>(y) * 0xc2b2ae3d27d4eb4fu +
-                  static_cast<uint64_t>(z) * 0x165667b19e3779f9u;
-  bits = (bits ^ (bits >> 30)) * 0xbf58476d1ce4e5b9u;
-  bits = (bits ^ (bits >> 27)) * 0x94d049bb133111ebu;
-  bits ^= bits >> 31;
-  return static_cast<double>(bits >> 11) / static_cast<double>(uint64_t{1} << 52) - 1;
-}
-
-}  // namespace
 
 double noise(const Vec3d& p) {
   const Vec3d cell{std::floor(p.x), std::floor(p.y), std::floor(p.z)};

@@ -9,8 +9,8 @@
 #include <map>
 #include <optional>
 
-#include "limn/core/displacement.h"
 #include "limn/core/error.h"
+#include "limn/core/mesh.h"
 #include "limn/core/parameter.h"
 #include "limn/core/surface_point.h"
 #include "tools/limn/command_support.h"
@@ -175,6 +175,50 @@ json write_numbers(const ParameterAdjoint& p, Table& table) {
   return entry;
 }
 
+// What both kinds of arrays have.
+json describe_array(const ParameterAdjoint& p, const BackwardFiles::Array& array, double scale,
+                    const std::string& main_file, Table& table) {
+  table.add({p.name, p.unit, six_digits(norm(p.moments)), error_cell(error_of(p.moments)),
+             main_file + " (norm of the array)"});
+  return {{"name", p.name},
+          {"unit", p.unit},
+          {"shape", p.shape},
+          {"norm", norm(p.moments)},
+          {"stderr", number(error_of(p.moments))},
+          {"array", array.npy},
+          {"picture", array.png},
+          {"scale", scale}};
+}
+
+json write_vertices(const Scene& scene, const ParameterAdjoint& p,
+                    const BackwardFiles::Array& array, const View& view, Table& table) {
+  const VertexGradient gradient = of_vertices(scene.shape(array.shape).mesh, p);
+  const Image image = picture(scene, array.shape, gradient, view);
+  const double scale = signed_scale(image);
+  write_file(array.ply, ply_text(scene.shape(array.shape).mesh,
+                                 {{"g", gradient.mean}, {"e", gradient.error}}));
+  write_file(array.npy, npy_text(p));
+  write_file(array.txt, field_text(gradient));
+  write_signed_png(array.png, image, scale);
+  json entry = describe_array(p, array, scale, array.ply, table);
+  entry["mesh"] = array.ply;
+  entry["field"] = array.txt;
+  return entry;
+}
+
+// A field that --wrt EMITTER.data:FILE reads.
+json write_texels(const ParameterAdjoint& p, const BackwardFiles::Array& array, Table& table) {
+  const Image map = to_map(p, false);
+  const double scale = signed_scale(map);
+  write_exr(array.exr, map, false, {});
+  if (p.moments.batches() > 1) write_exr(array.stderr_exr, to_map(p, true), false, {});
+  write_file(array.npy, npy_text(p));
+  write_signed_png(array.png, map, scale);
+  json entry = describe_array(p, array, scale, array.exr, table);
+  entry["field"] = array.exr;
+  return entry;
+}
+
 }  // namespace
 
 std::vector<PlannedFile> BackwardFiles::planned(const std::string& also) const {
@@ -221,54 +265,6 @@ BackwardFiles plan_files(const Scene& scene, const std::vector<std::string>& par
   }
   return files;
 }
-
-namespace {
-
-// What both kinds of arrays have.
-json describe_array(const ParameterAdjoint& p, const BackwardFiles::Array& array, double scale,
-                    const std::string& main_file, Table& table) {
-  table.add({p.name, p.unit, six_digits(norm(p.moments)), error_cell(error_of(p.moments)),
-             main_file + " (norm of the array)"});
-  return {{"name", p.name},
-          {"unit", p.unit},
-          {"shape", p.shape},
-          {"norm", norm(p.moments)},
-          {"stderr", number(error_of(p.moments))},
-          {"array", array.npy},
-          {"picture", array.png},
-          {"scale", scale}};
-}
-
-json write_vertices(const Scene& scene, const ParameterAdjoint& p,
-                    const BackwardFiles::Array& array, const View& view, Table& table) {
-  const VertexGradient gradient = of_vertices(scene.shape(array.shape).mesh, p);
-  const Image image = picture(scene, array.shape, gradient, view);
-  const double scale = signed_scale(image);
-  write_file(array.ply, ply_text(scene.shape(array.shape).mesh,
-                                 {{"g", gradient.mean}, {"e", gradient.error}}));
-  write_file(array.npy, npy_text(p));
-  write_file(array.txt, field_text(gradient));
-  write_signed_png(array.png, image, scale);
-  json entry = describe_array(p, array, scale, array.ply, table);
-  entry["mesh"] = array.ply;
-  entry["field"] = array.txt;
-  return entry;
-}
-
-// A field that --wrt EMITTER.data:FILE reads.
-json write_texels(const ParameterAdjoint& p, const BackwardFiles::Array& array, Table& table) {
-  const Image map = to_map(p, false);
-  const double scale = signed_scale(map);
-  write_exr(array.exr, map, false, {});
-  if (p.moments.batches() > 1) write_exr(array.stderr_exr, to_map(p, true), false, {});
-  write_file(array.npy, npy_text(p));
-  write_signed_png(array.png, map, scale);
-  json entry = describe_array(p, array, scale, array.exr, table);
-  entry["field"] = array.exr;
-  return entry;
-}
-
-}  // namespace
 
 json write_parameters(const Scene& scene, const BackwardFiles& files, const BackwardResult& result,
                       bool quiet) {

@@ -9,7 +9,6 @@
 
 #include "limn/core/coverage.h"
 #include "limn/core/error.h"
-#include "limn/integrators/trace_backward.h"
 #include "tools/limn/backward_output.h"
 #include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"

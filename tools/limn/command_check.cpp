@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "limn/core/error.h"
 #include "limn/core/parameter.h"
@@ -199,28 +200,18 @@ class CheckCommand final : public Command {
     if (same_paths_) return run_paths(scene);
     options_.samples = parse_samples(samples_);
     for (const auto& parameter : parameters_) find_parameter(scene, parameter);
-    json report = json::array();
-    int status = kSuccess;
-    for (const auto& parameter : parameters_) {
-      const RunSettings settings = make_settings(common_, scene, "check " + parameter);
+    return check_each(scene, [&](const RunSettings& settings) -> std::optional<Checked> {
       if (settings.spp < 2) {
         throw InputError("check needs --spp of at least 2, for standard errors");
       }
-      options_.parameter = parameter;
       const CheckResult r = check(scene, options_, settings);
-      if (r.interrupted) return no_verdict();
+      if (r.interrupted) return std::nullopt;
       warnings_.add_all(r.gradient.warnings);
-      print_check(parameter, r, settings.seconds);
-      report.push_back(figures_json(parameter, r));
-      report.back()["sensor"] = sensor_name(scene);
-      report.back()["warnings"] = warnings_.lines();
-      add_verdict(r.verdict, status);
+      print_check(options_.parameter, r, settings.seconds);
       NonFinite bad = r.gradient.non_finite;
       bad.merge(r.differences.non_finite);
-      if (const int s = finish_status(bad, 1, 1, "")) status = s;
-    }
-    write_json(common_.json, report.dump(2));
-    return status;
+      return Checked{figures_json(options_.parameter, r), r.verdict, bad};
+    });
   }
 
  private:
@@ -228,74 +219,77 @@ class CheckCommand final : public Command {
     fmt::print(stderr, "interrupted: no verdict\n");
     return kInterrupted;
   }
-  // What is wrong comes before what is not known.
-  static void add_verdict(Verdict verdict, int& status) {
-    if (verdict == Verdict::kDisagree) status = kDisagree;
-    const bool open = verdict == Verdict::kCannotTell || verdict == Verdict::kNotComplete;
-    if (open && status == kSuccess) status = kCannotTell;
-  }
 
-  int run_faces(const Scene& scene) {
+  struct Checked {
+    json figures;
+    Verdict verdict;
+    NonFinite bad;
+  };
+  // one: of options_.parameter; nothing if interrupted.
+  int check_each(const Scene& scene,
+                 const std::function<std::optional<Checked>(const RunSettings&)>& one) {
     json report = json::array();
     int status = kSuccess;
     for (const auto& parameter : parameters_) {
       options_.parameter = parameter;
-      const FacesCheck r =
-          check_faces(scene, options_, make_settings(common_, scene, "check " + parameter));
-      if (r.interrupted) return no_verdict();
+      const auto checked = one(make_settings(common_, scene, "check " + parameter));
+      if (!checked) return no_verdict();
+      report.push_back(checked->figures);
+      report.back()["sensor"] = sensor_name(scene);
+      report.back()["warnings"] = warnings_.lines();
+      // What is wrong comes before what is not known.
+      const Verdict verdict = checked->verdict;
+      if (verdict == Verdict::kDisagree) status = kDisagree;
+      const bool open = verdict == Verdict::kCannotTell || verdict == Verdict::kNotComplete;
+      if (open && status == kSuccess) status = kCannotTell;
+      if (const int s = finish_status(checked->bad, 1, 1, "")) status = s;
+    }
+    write_json(common_.json, report.dump(2));
+    return status;
+  }
+
+  // What checks without noise say.
+  template <class Check>
+  json sums_json(const Check& r, Verdict verdict) const {
+    return {{"parameter", options_.parameter},    {"step", r.step},
+            {"verdict", verdict_name(verdict)},   {"gradient_sum", r.gradient_sum},
+            {"difference_sum", r.difference_sum}, {"error", r.error}};
+  }
+
+  int run_faces(const Scene& scene) {
+    return check_each(scene, [&](const RunSettings& settings) -> std::optional<Checked> {
+      const FacesCheck r = check_faces(scene, options_, settings);
+      if (r.interrupted) return std::nullopt;
       warnings_.add_all(r.gradient.warnings);
       fmt::print(
           "{}: sum over the image: gradient {:.8g}, differences {:.8g} (step {:.3g})\n"
           "  they differ by {:.2g} of the derivative, of which differences know all but {:.2g}: "
           "{}\n",
-          parameter, r.gradient_sum, r.difference_sum, r.step, r.error, r.known,
+          options_.parameter, r.gradient_sum, r.difference_sum, r.step, r.error, r.known,
           verdict_name(r.verdict));
-      report.push_back({{"parameter", parameter},
-                        {"method", r.gradient.method},
-                        {"points", name_of(options_.points)},
-                        {"step", r.step},
-                        {"verdict", verdict_name(r.verdict)},
-                        {"gradient_sum", r.gradient_sum},
-                        {"difference_sum", r.difference_sum},
-                        {"error", r.error},
-                        {"known", number(r.known)},
-                        {"sensor", sensor_name(scene)},
-                        {"warnings", warnings_.lines()}});
-      add_verdict(r.verdict, status);
-      if (const int s = finish_status(r.non_finite, 1, 1, "")) status = s;
-    }
-    write_json(common_.json, report.dump(2));
-    return status;
+      json figures = sums_json(r, r.verdict);
+      figures["method"] = r.gradient.method;
+      figures["points"] = name_of(options_.points);
+      figures["known"] = number(r.known);
+      return Checked{figures, r.verdict, r.non_finite};
+    });
   }
 
   int run_paths(const Scene& scene) {
     refuse_options(*app_, {"--method", "--terms", "--samples", "--block", "--points"},
                    "not with --same-paths, which has paths of its own");
     for (const auto& parameter : parameters_) refuse_moved_paths(scene, parameter);
-    json report = json::array();
-    int status = kSuccess;
-    for (const auto& parameter : parameters_) {
-      const PathsCheck r = check_paths(scene, parameter, options_.step,
-                                       make_settings(common_, scene, "check " + parameter));
-      if (r.interrupted) return no_verdict();
+    return check_each(scene, [&](const RunSettings& settings) -> std::optional<Checked> {
+      const PathsCheck r = check_paths(scene, options_.parameter, options_.step, settings);
+      if (r.interrupted) return std::nullopt;
       const Verdict verdict = r.agrees() ? Verdict::kAgree : Verdict::kDisagree;
       fmt::print(
           "{}: sum over the image: gradient {:.8g}, differences along the same paths {:.8g} (step "
           "{:.3g})\n  pixels differ by {:.2g} of the derivative: {}\n",
-          parameter, r.gradient_sum, r.difference_sum, r.step, r.error,
+          options_.parameter, r.gradient_sum, r.difference_sum, r.step, r.error,
           r.is_zero() ? "agree: both are zero" : verdict_name(verdict));
-      report.push_back({{"parameter", parameter},
-                        {"step", r.step},
-                        {"verdict", verdict_name(verdict)},
-                        {"gradient_sum", r.gradient_sum},
-                        {"difference_sum", r.difference_sum},
-                        {"error", r.error},
-                        {"sensor", sensor_name(scene)}});
-      add_verdict(verdict, status);
-      if (const int s = finish_status(r.non_finite, 1, 1, "")) status = s;
-    }
-    write_json(common_.json, report.dump(2));
-    return status;
+      return Checked{sums_json(r, verdict), verdict, r.non_finite};
+    });
   }
 
   // The one requested, else the default of reverse mode.

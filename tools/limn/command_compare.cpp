@@ -7,13 +7,12 @@
 #include "limn/core/names.h"
 #include "limn/core/parallel.h"
 #include "limn/core/parameter.h"
-#include "limn/integrators/compare_images.h"
+#include "limn/integrators/compare.h"
 #include "limn/integrators/methods.h"
 #include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
 #include "tools/limn/compare_output.h"
 #include "tools/limn/output_files.h"
-#include "tools/limn/report_script.h"
 #include "tools/mitsuba/mitsuba_method.h"
 
 namespace limn {

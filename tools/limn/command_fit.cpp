@@ -14,8 +14,7 @@
 #include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
 #include "tools/limn/fit_folder.h"
-#include "tools/limn/folder_lock.h"
-#include "tools/limn/report_script.h"
+#include "tools/limn/output_files.h"
 #include "tools/limn/terminal.h"
 
 namespace limn {

@@ -1,4 +1,5 @@
 // `limn gradient`: derivative images with standard errors, by any method.
+#include "limn/core/memory.h"
 #include "limn/integrators/gradient.h"
 
 #include <algorithm>
@@ -231,13 +232,10 @@ class GradientCommand final : public Command {
     const double numbers = parameters * (3 * (terms + 1) + terms) + 5;
     const double bytes = numbers * sizeof(double) * 3 * scene.film.crop_width *
                          static_cast<double>(scene.film.crop_height);
-    const double available = available_memory();
-    if (available <= 0 || bytes < available) return;
-    throw InputError(fmt::format(
-        "the derivative images of {} parameter{} of {} x {} pixels need {:.3g} GB, {:.3g} GB are "
-        "free: take fewer --wrt in one run, or a smaller film or crop",
-        parameters, parameters == 1 ? "" : "s", scene.film.crop_width, scene.film.crop_height,
-        bytes / 1e9, available / 1e9));
+    require_memory({scene.file}, bytes,
+                   fmt::format("a run with {:.0f} --wrt of {} x {} pixels", parameters,
+                               scene.film.crop_width, scene.film.crop_height),
+                   "take fewer --wrt in one run, or a smaller film or crop");
   }
 
   std::string samples_file(const std::string& term) const {

@@ -12,13 +12,13 @@
 #include "limn/core/make_bsdf.h"
 #include "limn/core/names.h"
 #include "limn/core/parallel.h"
+#include "limn/core/ray_tracer.h"
 #include "limn/edgetree/edge_sampler_types.h"
 #include "limn/edgetree/quadric_chart.h"
-#include "limn/edgetree/rejection_places.h"
+#include "limn/edgetree/rejection.h"
 #include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
 #include "tools/limn/output_files.h"
-#include "tools/limn/report_script.h"
 #include "tools/limn/table.h"
 #include "tools/limn/terminal.h"
 
@@ -84,17 +84,6 @@ EdgeMesh keep_one_shape(Scene& scene, const std::string& id) {
   scene.shapes.clear();
   scene.shapes.push_back(std::move(shape));
   return chosen;
-}
-
-double radius_of(const EdgeMesh& mesh) {
-  Bounds bounds;
-  for (const Edge& edge : mesh.edges)
-    for (const VertexId vertex : edge.vertices) bounds.extend(mesh.position(vertex));
-  double radius = 0;
-  for (const Edge& edge : mesh.edges)
-    for (const VertexId vertex : edge.vertices)
-      radius = std::max(radius, length(mesh.position(vertex) - bounds.center()));
-  return radius;
 }
 
 // ---- Methods.

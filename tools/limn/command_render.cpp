@@ -4,7 +4,7 @@
 
 #include "limn/core/error.h"
 #include "limn/core/exposure.h"
-#include "limn/core/image_alpha.h"
+#include "limn/core/image.h"
 #include "limn/core/names.h"
 #include "limn/integrators/layers.h"
 #include "limn/integrators/methods.h"

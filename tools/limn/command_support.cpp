@@ -12,7 +12,7 @@
 #include "limn/core/error.h"
 #include "limn/core/names.h"
 #include "limn/core/parallel.h"
-#include "limn/core/set_shading.h"
+#include "limn/core/scene.h"
 #include "tools/limn/command_support.h"
 #include "tools/limn/output_files.h"
 #include "tools/limn/terminal.h"
@@ -243,17 +243,6 @@ void write_json(const std::string& file, const std::string& text) {
 void copy_json(const std::string& from, const std::string& to) {
   if (to.empty()) return;
   std::filesystem::copy_file(from, to, std::filesystem::copy_options::overwrite_existing);
-}
-
-double available_memory() {
-  std::ifstream stream("/proc/meminfo");
-  std::string name, unit;
-  double kilobytes = 0;
-  while (stream >> name >> kilobytes) {
-    if (name == "MemAvailable:") return 1024 * kilobytes;
-    std::getline(stream, unit);
-  }
-  return 0;
 }
 
 std::vector<std::string> parse_terms(const std::string& list) { return split(list); }

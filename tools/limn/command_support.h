@@ -68,8 +68,6 @@ std::string with_ending(const std::string& output, const std::string& ending);
 void check_output(const std::string& file);
 void write_json(const std::string& file, const std::string& text);  // nothing for ""
 void copy_json(const std::string& from, const std::string& to);     // likewise
-// Bytes that can be taken without paging, as the system reports; 0 if it does not.
-double available_memory();
 // "a,b" of --terms; none for "".
 std::vector<std::string> parse_terms(const std::string& list);
 // The counts of --samples; none for "auto".

@@ -10,9 +10,7 @@
 #include <filesystem>
 
 #include "limn/core/error.h"
-#include "limn/core/field_error.h"
 #include "limn/core/names.h"
-#include "limn/core/nearest_names.h"
 #include "tools/limn/commands.h"
 #include "tools/limn/option_adder.h"
 #include "tools/limn/version.h"

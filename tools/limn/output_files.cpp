@@ -1,19 +1,26 @@
 // What a command writes: names that collide, places that cannot be written, leftovers.
 #include "tools/limn/output_files.h"
 
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
 #include <sys/stat.h>
-
+#include <unistd.h>
 #include <algorithm>
+#include <array>
 #include <cctype>
+#include <cerrno>
 #include <filesystem>
 #include <fstream>
 #include <map>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "limn/core/error.h"
 #include "limn/core/image.h"
 #include "limn/core/output_file.h"
+#include "tools/limn/child_process.h"
 
 namespace limn {
 namespace {
@@ -90,6 +97,20 @@ bool is_own(const fs::path& file, const std::string& output) {
   } catch (const InputError&) {
   }
   return false;
+}
+
+constexpr const char* kScript = "report.py";
+
+// A Python that has matplotlib: Debian's first. "" if there is none.
+std::string find_python() {
+  for (const char* python : {"/usr/bin/python3", "python3"}) {
+    if (run_child({python, "-c", "import matplotlib"}).status == 0) return python;
+  }
+  return "";
+}
+
+void print_missing(const std::string& folder, const std::string& what) {
+  fmt::print(stderr, "no report.html: {}\nAll data is in {}\n", what, folder);
 }
 
 }  // namespace
@@ -198,6 +219,66 @@ void remove_stale(const std::string& output, const std::vector<std::string>& wri
     file.replace_extension(".png");
     if (!now.has(file.string())) fs::remove(file, failed);
   }
+}
+
+void write_report(const std::string& folder, bool quiet) {
+  const std::string script = tool_script(kScript);
+  if (script.empty()) {
+    print_missing(folder, "tools/report.py is not beside the program's folder");
+    return;
+  }
+  const std::string python = find_python();
+  if (python.empty()) {
+    print_missing(
+        folder,
+        "it needs Python 3 with matplotlib (Debian: apt install python3-matplotlib); then "
+        "run\n  python3 " +
+            script + " " + folder);
+    return;
+  }
+  const ChildOutcome outcome = run_child({python, script, folder});
+  if (outcome.status != 0) {
+    print_missing(folder, script + " failed:\n" + outcome.errors);
+  } else if (!quiet) {
+    fmt::print("{}/report.html: pictures and charts\n", folder);
+  }
+}
+
+FolderLock::FolderLock(const std::string& folder)
+    : file_((std::filesystem::path(folder) / "limn.lock").string()) {
+  std::error_code failed;
+  std::filesystem::create_directories(folder, failed);
+  if (failed) throw InputError({folder}, "cannot be written");
+  while (!try_to_lock()) {
+  }
+  std::array<char, 256> host{};
+  gethostname(host.data(), host.size() - 1);
+  std::ofstream(file_) << fmt::format("process {} on {}", getpid(), host.data());
+}
+
+// False if the other process removed the file in between.
+bool FolderLock::try_to_lock() {
+  const std::string folder = std::filesystem::path(file_).parent_path().string();
+  descriptor_ = open(file_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+  if (descriptor_ < 0) throw InputError({folder}, "cannot be written");
+  if (flock(descriptor_, LOCK_EX | LOCK_NB) == 0) {
+    struct stat status {};
+    if (fstat(descriptor_, &status) == 0 && status.st_nlink > 0) return true;
+    close(descriptor_);
+    return false;
+  }
+  const bool taken = errno == EWOULDBLOCK;
+  close(descriptor_);
+  if (!taken) return descriptor_ = -1, true;  // a file system without locks
+  std::string holder;
+  std::getline(std::ifstream(file_), holder);
+  throw InputError({folder}, fmt::format("{} works in this folder: wait for it, or take another",
+                                         holder.empty() ? "another process" : holder));
+}
+
+FolderLock::~FolderLock() {
+  unlink(file_.c_str());
+  if (descriptor_ >= 0) close(descriptor_);
 }
 
 }  // namespace limn

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "limn/core/error.h"
-#include "limn/core/names.h"
 #include "limn/core/parameter.h"
 #include "tools/python/arguments.h"
 

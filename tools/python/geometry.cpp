@@ -1,7 +1,7 @@
 // The camera's pose, and rays of the caller.
 #include "limn/core/camera_pose.h"
 #include "limn/core/error.h"
-#include "limn/core/first_hits.h"
+#include "limn/core/ray_tracer.h"
 #include "tools/python/bindings.h"
 
 namespace limn::python {

@@ -5,7 +5,6 @@
 #include <filesystem>
 
 #include "limn/core/error.h"
-#include "limn/core/image_alpha.h"
 #include "tools/python/bindings.h"
 
 namespace limn::python {

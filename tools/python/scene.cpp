@@ -5,13 +5,10 @@
 
 #include <map>
 
-#include "limn/core/advice.h"
 #include "limn/core/coverage.h"
 #include "limn/core/error.h"
-#include "limn/core/field_error.h"
 #include "limn/core/names.h"
 #include "limn/core/parameter.h"
-#include "limn/core/set_shading.h"
 #include "tools/python/bindings.h"
 
 namespace limn::python {

@@ -2,7 +2,6 @@
 // The blurred faces that a ray meets.
 #include <memory>
 #include <optional>
-#include <span>
 #include <vector>
 
 #include "limn/core/blur.h"

@@ -19,7 +19,6 @@
 #include "limn/core/bsdf_value.h"
 #include "limn/core/lobe.h"
 #include "limn/core/parameter_ref.h"
-#include "limn/core/smooth_ray.h"
 #include "limn/core/texture.h"
 
 namespace limn {

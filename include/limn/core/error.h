@@ -30,4 +30,12 @@ class UnknownParameter : public InputError {
   using InputError::InputError;
 };
 
+// Of an option: the library names the field, the program its spelling. "error: FIELD: MESSAGE".
+class FieldError : public InputError {
+ public:
+  FieldError(const std::string& field_name, const std::string& text)
+      : InputError(field_name + ": " + text), field(field_name), message(text) {}
+  std::string field, message;
+};
+
 }  // namespace limn

@@ -12,7 +12,7 @@
 
 namespace limn {
 
-struct CoincidentFaces;  // coincident_faces.h
+struct CoincidentFaces;  // face_overlaps.h
 struct Parameter;        // parameter.h
 
 struct Keyframe {

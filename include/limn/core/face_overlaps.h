@@ -2,6 +2,7 @@
 // Coplanar overlapping faces, and faces so close together that float rays cannot resolve which is
 // in front. A rule, or double precision, decides which of them a ray hits.
 #include <algorithm>
+#include <memory>
 #include <optional>
 #include <span>
 #include <unordered_map>
@@ -101,5 +102,20 @@ class FaceOverlaps {
 // One warning for each pair of shapes with duplicate or coplanar overlapping faces that face the
 // same way.
 void warn_of_overlaps(const Scene& scene, std::vector<std::string>& warnings);
+
+// Duplicates and overlaps of a scene's faces, computed once and shared.
+// The scene must outlive it.
+struct CoincidentFaces {
+  CoincidentFaces(const Scene& scene, int threads)
+      : copies(scene), overlaps(scene, copies, threads) {}
+  CoincidentFaces(const CoincidentFaces&) = delete;
+  CoincidentFaces& operator=(const CoincidentFaces&) = delete;
+  DuplicateFaces copies;
+  FaceOverlaps overlaps;
+};
+
+// make_embree_tracer with overlaps that were computed for the same positions; null: computes them.
+std::unique_ptr<RayTracer> make_embree_tracer(const Scene& scene, int threads,
+                                              std::shared_ptr<const CoincidentFaces> faces);
 
 }  // namespace limn

@@ -74,4 +74,22 @@ void write_signed_png(const std::string& file, const Image& image, double scale)
 // all are zero.
 double signed_scale(const Image& image);
 
+// The alpha channel of a PNG or EXR image as its file stores it (1: opaque), H by W by 1; without
+// pixels where the file has none, and for other formats. InputError as read_image().
+Image read_alpha(const std::string& file);
+
+// As write_exr(), with alpha (H by W by 1) as channel A.
+void write_exr_with_alpha(const std::string& file, const Image& image, const Image& alpha,
+                          bool half, const std::vector<ImageAttribute>& attributes);
+
+// A layer's channels are named NAME.A, NAME.B, ...
+struct ImageLayer {
+  std::string name;
+  std::string channels;  // "XYZ": one letter for each channel of the image, in alphabetical order
+  Image image;
+};
+// As write_exr(), in single precision. layers: of one size, at least one.
+void write_exr_layers(const std::string& file, const std::vector<ImageLayer>& layers,
+                      const std::vector<ImageAttribute>& attributes);
+
 }  // namespace limn

@@ -1,5 +1,6 @@
 #pragma once
-// Memory checks before large allocations.
+// Memory that is free, and that was taken.
+#include <cstdint>
 #include <string>
 
 #include "limn/core/error.h"
@@ -14,5 +15,10 @@ double free_memory();
 // memory, and 4.5 GB are free: REMEDY".
 void require_memory(const SourceLocation& where, double bytes, const std::string& what,
                     const std::string& remedy);
+
+// The largest resident size of this process since the last reset, in bytes; 0 where the system does
+// not tell (Linux does, see proc(5): clear_refs and VmHWM).
+void reset_peak_memory();
+uint64_t peak_memory_bytes();
 
 }  // namespace limn

@@ -178,4 +178,8 @@ Mesh read_mesh(const std::string& file, bool face_normals);
 // Reads a velocity field: positions of a mesh file, or lines "x y z" of a text file, in order.
 std::vector<Vec3d> read_vertex_vectors(const std::string& file);
 
+// V unit vectors, equal for welded vertices: angle-weighted means of the adjacent face normals,
+// also if shading is flat or normals are given. Zero for a vertex without faces.
+std::vector<Vec3d> displacement_directions(const Mesh& mesh);
+
 }  // namespace limn

@@ -1,7 +1,6 @@
 #pragma once
 // Numbers that a mesh's file gives its vertices or faces.
 #include <array>
-#include <memory>
 #include <string>
 #include <vector>
 

@@ -27,4 +27,16 @@ std::string unknown_name(const std::string& what, const std::string& name,
 std::string known_names(const std::vector<std::string>& known,
                         const std::string& none = "none are known");
 
+// The up to `count` names with the fewest insertions, deletions and replacements of a character
+// (Levenshtein's distance), the nearest first; ties in the order of `known`.
+std::vector<std::string> nearest_names(const std::string& name, std::vector<std::string> known,
+                                       size_t count);
+
+// unknown TAG type "NAME" (known: A, B), and advice_on(name).
+std::string unknown_type(const std::string& tag, const std::string& name,
+                         const std::vector<std::string>& known);
+
+// "; " and what to write in place of a type of Mitsuba's that limn lacks, or "".
+std::string advice_on(const std::string& type);
+
 }  // namespace limn

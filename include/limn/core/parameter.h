@@ -10,7 +10,7 @@
 //   SHAPE.vertex_positions.V.x|y|z  one of them: vertex V (from 0) with its copies
 //   SHAPE.vertex_positions:FILE   moves every vertex by the parameter times its vector in FILE
 //   SHAPE.displacement            scene units: an array, how far each of its V vertices goes along
-//                                 its normal (displacement.h)
+//                                 its normal (mesh.h)
 //   SHAPE.displacement.V          one of them: vertex V (from 0) with its copies
 //   SHAPE.velocity.x|y|z          scene units per unit of time, where a shutter stays open: what is
 //                                 added to its course (exposure.h)
@@ -33,6 +33,7 @@
 // Capitals stand for the id of an element, or for what the user writes.
 #include <limits>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -131,5 +132,25 @@ Parameter vertex_field(const Scene& scene, ShapeId shape, std::vector<Vec3d> fie
 // A parameter that changes every texel of the array `texels` by its value in `field` (H by W by 3),
 // like EMITTER.data:FILE.
 Parameter texel_field(const Scene& scene, const Parameter& texels, const Image& field);
+
+// What parameters move. Values (colours, roughness, radiance, texels) are none of it: where nothing
+// moves, no edge of what is seen does, and derivatives need none.
+struct Moved {
+  bool vertices = false;
+  bool camera = false;
+  bool delta_lights = false;  // positions, and directions of those at infinity
+  // Where paths go on from smooth lobes, as an index of refraction changes. moved_by leaves it
+  // open; moved_in (integrators/terms/term.h) has it.
+  bool rays = false;
+
+  bool any() const { return vertices || camera || delta_lights || rays; }
+  Moved operator|(const Moved& o) const {
+    return {vertices || o.vertices, camera || o.camera, delta_lights || o.delta_lights,
+            rays || o.rays};
+  }
+};
+
+// The union of what the parameters move.
+Moved moved_by(std::span<const Parameter> parameters);
 
 }  // namespace limn

@@ -2,10 +2,8 @@
 // Typed access to the properties of one element of a scene file. A property that is never
 // read, or a nested object that is never used, is an error; the message lists the known
 // names.
-#include <map>
 #include <memory>
 #include <string>
-#include <variant>
 #include <vector>
 
 #include "limn/core/dual.h"

@@ -1,12 +1,11 @@
 #pragma once
 // Ray tracing: closest hits and occlusion for the triangles of a scene.
-#include <array>
 #include <cmath>
-#include <cstdint>
 #include <exception>
 #include <limits>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "limn/core/scene.h"
 
@@ -68,5 +67,18 @@ class RayTracer {
 // local coordinates, so that hits do not depend on their location, within the precision of float
 // positions. InputError with Embree's message if it fails (out of memory, unsupported machine).
 std::unique_ptr<RayTracer> make_embree_tracer(const Scene& scene, int threads);
+
+struct FirstHit {
+  FaceRef face;    // none for a miss
+  double t = 0;    // distance from the origin [scene units]; infinite for a miss
+  Vec3d normal;    // of the face, unit, on its outer side
+  double uv[2]{};  // barycentric: position = (1 - u - v) a + u b + v c of the face's corners
+};
+
+// The closest hit of each ray, from distance 0 on; directions need not be unit. Builds a ray
+// tracer. InputError for other counts, and for a ray that is not finite or has no direction, by its
+// index.
+std::vector<FirstHit> first_hits(const Scene& scene, const std::vector<Vec3d>& origins,
+                                 const std::vector<Vec3d>& directions, int threads);
 
 }  // namespace limn

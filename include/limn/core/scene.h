@@ -126,4 +126,7 @@ size_t count_sensors(const std::string& file, const std::map<std::string, std::s
 void set_mesh(Scene& scene, ShapeId shape, std::vector<Vec3f> positions,
               std::vector<FaceIndices> faces, std::vector<std::string>* warnings);
 
+// Sets Scene::shading, and how materials use normals of maps (Bsdf::set_mitsuba_shading).
+void set_shading(Scene& scene, ShadingModel model);
+
 }  // namespace limn

@@ -3,7 +3,6 @@
 // depend on them. Tape::slots() refers to those of the current scene.
 #include <array>
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include "limn/core/scene.h"

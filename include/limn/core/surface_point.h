@@ -1,7 +1,6 @@
 #pragma once
 // A point on a surface, over any scalar: where a ray meets a face, with its normals, and where the
 // rays start that leave it: above faces with interpolated normals, see surface_lift.h.
-#include <algorithm>
 #include <array>
 #include <cmath>
 

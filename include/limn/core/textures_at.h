@@ -1,6 +1,5 @@
 #pragma once
 // The textures of a BSDF at a surface point, over any scalar, and the BSDF with them.
-#include <array>
 #include <type_traits>
 
 #include "limn/core/slots.h"

@@ -1,8 +1,6 @@
 #pragma once
 // Three-vectors and colours over any scalar (double, or Dual).
-#include <array>
 #include <cmath>
-#include <cstdint>
 
 namespace limn {
 

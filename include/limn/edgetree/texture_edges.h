@@ -1,7 +1,6 @@
 #pragma once
 // Edges inside of faces: where the texture of a surface is discontinuous.
 #include <span>
-#include <vector>
 
 #include "limn/edgetree/edges.h"
 

@@ -167,4 +167,11 @@ int most_pyramid_levels(const Scene& scene);
 void check_loss_images(const Scene& scene, const Image& target, const Image& mask,
                        const std::string& target_place = "", const std::string& mask_place = "");
 
+// As trace_sample() of gradient.h: one path of a pixel (x >= 0), by the number that the run gave
+// it, or one of a term's points on the film, with what it adds to every parameter. settings: those
+// of the run, without a limit of time. InputError if the run has no such sample.
+std::vector<std::string> trace_backward(const Scene& scene, const Image& adjoint,
+                                        const BackwardOptions& options, const RunSettings& settings,
+                                        const NonFinite::SampleId& place);
+
 }  // namespace limn

@@ -3,9 +3,7 @@
 // sees of the sky, kept along lines between silhouettes (after Nowrouzezahrai, Baran, Mitchell,
 // Jarosz 2014, section 4). Its image is linear in a map's texels, and that sum is all that is left
 // to do.
-#include <atomic>
 #include <cstdint>
-#include <memory>
 #include <string>
 #include <vector>
 

@@ -6,6 +6,7 @@
 
 #include "limn/integrators/metrics.h"
 #include "limn/integrators/reference.h"
+#include "limn/integrators/render.h"
 #include "limn/integrators/timed_method.h"
 
 namespace limn {
@@ -65,5 +66,18 @@ NonFinite non_finite_of(const Reference& reference, const std::vector<ComparedMe
 int block_size(const Film& film);
 // The seed of one run: a different one for each purpose, whatever the other runs are.
 uint64_t derived_seed(uint64_t seed, const std::string& purpose);
+
+// Renders by `method` with what `options` has besides.
+// Makes one sample first, by `settings`: InputError if the method does not know the scene, which
+// must outlive it. block: pixels, of the block sums.
+std::unique_ptr<TimedMethod> make_image_method(const Scene& scene, RenderOptions options,
+                                               const Method& method, int block,
+                                               const RunSettings& settings);
+
+// The mean of eight runs, in settings.seconds together, whose differences tell its variance. The
+// method is rays where they know the scene's light, else path, and not_by_rays says why. Without
+// samples if interrupted. InputError for a black image.
+Reference make_image_reference(const Scene& scene, RenderOptions options, int block,
+                               const RunSettings& settings, std::string& not_by_rays);
 
 }  // namespace limn

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "limn/core/image_layers.h"
+#include "limn/core/image.h"
 #include "limn/core/scene.h"
 #include "limn/integrators/run.h"
 

@@ -12,7 +12,6 @@
 // sums) and its sums (float64), then an empty array of int64. The last line of the text is the
 // CRC-32 of the others. So a flipped bit anywhere is an error.
 #include <cstdint>
-#include <map>
 #include <memory>
 #include <string>
 #include <utility>

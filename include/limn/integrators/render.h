@@ -1,6 +1,5 @@
 #pragma once
 // Images of a scene.
-#include <span>
 #include <string>
 #include <vector>
 

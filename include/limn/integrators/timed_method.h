@@ -1,6 +1,6 @@
 #pragma once
 // Methods as comparisons run them: each takes a time and returns a derivative image, or an image
-// (compare_images.h), with what it knows of its own error. The rows of methods.h are such methods;
+// (compare.h), with what it knows of its own error. The rows of methods.h are such methods;
 // others can live outside.
 #include <memory>
 #include <optional>

@@ -1,6 +1,5 @@
 #pragma once
 // Random choices of a seed.
-#include <cmath>
 #include <cstdint>
 #include <initializer_list>
 #include <vector>

@@ -1,6 +1,5 @@
 #pragma once
 // Scenes that break things, and what to ask of them.
-#include <cstdint>
 #include <string>
 
 #include "limn/core/scene.h"
