@@ -213,7 +213,8 @@ void ShadowTerm::add_sample(const Viewer& viewer, const ShadowDraw& draw, const 
     if (pieces_ && by_pieces < 0) by_pieces = pieces_->density(viewer.query, draw.edge, draw.t);
     double share = 1;
     if (viewer.by_lines) {
-      share -= lines_.share(edge, edges_.probability(draw.edge), *point, *viewer.by_lines);
+      share -= lines_.share(edge, edges_.probability(draw.edge), *point, *viewer.by_lines,
+                            lines_.density(edge, *point, *viewer.by_lines), vertex.scattering);
     }
     form = sweep(edge, *point, {omega, distance}, share / density(draw, by_pieces));
   }
@@ -297,8 +298,9 @@ void ShadowTerm::add_line(double u, const Rng& key, FilmSink& sink) const {
   const Rgb<double> f = scattering.eval_value(way);
   if (!(distance > 0) || is_black(f)) return;
   const double probability = edges_.probability(chosen);
-  const double share = lines_.share(edge, probability, *point, *vertex);
-  const double density = ShadowLines::kShare * probability * lines_.density(edge, *point, *vertex);
+  const double by_line = lines_.density(edge, *point, *vertex);
+  const double share = lines_.share(edge, probability, *point, *vertex, by_line, scattering);
+  const double density = ShadowLines::kShare * probability * by_line;
   const Rgb<double> amount = f * edges_.difference(edge, *point, vertex->q, way);
   if (is_black(amount) || !(density > 0)) return;
   BoundaryForm form = sweep(edge, *point, {way, distance}, share / density);
