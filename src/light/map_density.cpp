@@ -1,4 +1,4 @@
-// The quadtree over the cells of an environment map, its alias tables, and its density.
+// The quadtree over the cells of an environment map, its draws, and its density.
 #include "src/light/map_density.h"
 
 #include <algorithm>
@@ -200,8 +200,7 @@ class MapDensity::Builder {
               {1, 1, 1, 1},
               static_cast<uint32_t>(x),
               static_cast<uint32_t>(y),
-              static_cast<uint32_t>(log),
-              {}};
+              static_cast<uint32_t>(log)};
     if (x < d_.width_ && y + 1 < d_.height_) {
       const Patch p = d_.patch(x, y, log);
       const Fit f = fit(p);
@@ -228,7 +227,7 @@ MapDensity::MapDensity(int width, int height, std::span<const float> importance)
     cos_theta_.push_back(std::cos(kPi * row / (height - 1)));
   }
   Builder(*this, importance).run();
-  build_aliases();
+  build_distributions();
 }
 
 MapDensity::Patch MapDensity::patch(int column, int row, int log) const {
@@ -254,82 +253,63 @@ double MapDensity::mass(const Leaf& leaf) const {
   return 0.25 * sum_of(leaf.corners) * leaf.scale * solid_angle(leaf);
 }
 
-void MapDensity::build_aliases() {
-  std::vector<double> block_weights;
+void MapDensity::build_distributions() {
+  leaves_before_.resize(leaves_.size());
   double total = 0;
   for (const Block& block : blocks_) {
-    std::vector<double> weights;
+    const std::span<double> weights(&leaves_before_[block.first], block.count);
     double sum = 0;
     for (uint32_t i = 0; i < block.count; ++i) {
-      weights.push_back(mass(leaves_[block.first + i]));
-      sum += weights.back();
+      sum += weights[i] = mass(leaves_[block.first + i]);
     }
-    const std::vector<Slot> slots = make_slots(weights, sum);
-    for (uint32_t i = 0; i < block.count; ++i) leaves_[block.first + i].slot = slots[i];
-    block_weights.push_back(sum);
+    accumulate(weights, sum);
+    blocks_before_.push_back(sum);
     total += sum;
+    most_leaves_ = std::max(most_leaves_, block.count);
   }
+  accumulate(blocks_before_, total);
   inverse_total_ = 1 / total;
-  block_slots_ = make_slots(block_weights, total);
 }
 
-// Vose 1991, "A linear algorithm for generating random numbers with a given distribution".
-std::vector<MapDensity::Slot> MapDensity::make_slots(std::span<const double> weights,
-                                                     double total) {
-  const auto count = static_cast<uint32_t>(weights.size());
-  std::vector<Slot> slots(count);
-  std::vector<double> filled(count);
-  std::vector<uint32_t> small, large;
-  for (uint32_t i = 0; i < count; ++i) {
-    filled[i] = total > 0 ? weights[i] / total * count : 1;
-    (filled[i] < 1 ? small : large).push_back(i);
+// Those without weight at the end get 1, which no number reaches.
+void MapDensity::accumulate(std::span<double> weights, double total) {
+  double sum = 0;
+  for (double& weight : weights) {
+    const double before = sum;
+    sum += weight;
+    weight = total > 0 ? before / total : 0;
   }
-  while (!small.empty() && !large.empty()) {
-    const uint32_t poor = small.back();
-    const uint32_t rich = large.back();
-    small.pop_back();
-    slots[poor] = {static_cast<float>(filled[poor]), rich};
-    filled[rich] -= 1 - filled[poor];
-    if (filled[rich] < 1) {
-      large.pop_back();
-      small.push_back(rich);
-    }
-  }
-  // The remaining slots are full up to rounding, which is far below one slot: so none of them
-  // belongs to an item of weight zero.
-  for (const auto* rest : {&small, &large}) {
-    for (const uint32_t i : *rest) slots[i] = {1, i};
-  }
-  return slots;
 }
 
-template <class SlotOf>
-[[gnu::always_inline]] inline wide::Ints MapDensity::choose(const SlotOf& slot_of,
-                                                            const wide::Ints& first,
-                                                            const wide::Ints& count,
-                                                            wide::Doubles& u) {
+// By bisection. Of items that no weight parts the last is taken, which alone may have some.
+inline wide::Ints MapDensity::choose(std::span<const double> before, const wide::Ints& first,
+                                     const wide::Ints& count, uint32_t most, wide::Doubles& u) {
   using wide::Doubles, wide::Ints;
-  const Doubles place = u * wide::to_doubles(count);
-  const Ints index = wide::min(wide::truncated(place), count - 1), at = first + index;
-  const Doubles share = wide::gather([&](int i) { return slot_of(at[i]).share; });
-  const Ints alias =
-      wide::gather_ints([&](int i) { return static_cast<int32_t>(slot_of(at[i]).alias); });
-  u = place - wide::to_doubles(index);
-  const wide::Mask own = u < share;
-  u = (u - select(own, 0, share)) / select(own, share, 1 - share);
-  return first + wide::select(own, index, alias);
+  const auto at = [&](const Ints& item) {
+    return wide::gather([&](int i) { return before[static_cast<size_t>(item[i])]; });
+  };
+  const Ints last = first + count - 1;
+  Ints chosen = first;
+  for (uint32_t step = std::bit_floor(most); step > 0; step /= 2) {
+    const Ints next = wide::min(chosen + static_cast<int>(step), last);
+    chosen = wide::select(u < at(next), chosen, next);
+  }
+  const Doubles lower = at(chosen);
+  const Doubles upper = wide::gather(
+      [&](int i) { return chosen[i] < last[i] ? before[static_cast<size_t>(chosen[i]) + 1] : 1; });
+  u = wide::min((u - lower) / (upper - lower), 1 - 0x1p-53);
+  return chosen;
 }
 
 MapDensity::Drawn MapDensity::sample(const wide::Doubles& u1, const wide::Doubles& u2) const {
   using wide::Doubles, wide::gather, wide::gather_ints, wide::Ints, wide::to_doubles;
-  Doubles u = u1;
-  const Ints b = choose([&](int i) { return block_slots_[static_cast<size_t>(i)]; }, Ints{},
-                        Ints{} + static_cast<int>(blocks_.size()), u);
+  Doubles down = u1, along = u2;
+  const auto blocks = static_cast<uint32_t>(blocks_.size());
+  const Ints b = choose(blocks_before_, Ints{}, Ints{} + static_cast<int>(blocks), blocks, down);
   const auto block = [&](int i) { return blocks_[static_cast<size_t>(b[i])]; };
   const Ints first = gather_ints([&](int i) { return static_cast<int32_t>(block(i).first); });
   const Ints count = gather_ints([&](int i) { return static_cast<int32_t>(block(i).count); });
-  const Ints l =
-      choose([&](int i) { return leaves_[static_cast<size_t>(i)].slot; }, first, count, u);
+  const Ints l = choose(leaves_before_, first, count, most_leaves_, along);
   const auto leaf = [&](int i) { return leaves_[static_cast<size_t>(l[i])]; };
   // The leaf's extent, as in `patch`.
   const Ints log = gather_ints([&](int i) { return static_cast<int32_t>(leaf(i).log); });
@@ -345,9 +325,9 @@ MapDensity::Drawn MapDensity::sample(const wide::Doubles& u1, const wide::Double
   const Ints corners = gather_ints([&](int i) { return std::bit_cast<int32_t>(leaf(i).corners); });
   const auto corner = [&](int k) { return to_doubles(corners >> 8 * k & 255); };
   const Doubles c0 = corner(0), c1 = corner(1), c2 = corner(2), c3 = corner(3);
-  const Doubles t = sample_linear(c0 + c1, c2 + c3, u);
+  const Doubles t = sample_linear(c0 + c1, c2 + c3, down);
   const Doubles left = mix(c0, c2, t), right = mix(c1, c3, t);
-  const Doubles s = sample_linear(left, right, u2);
+  const Doubles s = sample_linear(left, right, along);
   const Doubles scale = gather([&](int i) { return leaf(i).scale; });
   return {to_doubles(x0) + s * to_doubles(x1 - x0), mix(cosine(y0), cosine(y1), t),
           mix(left, right, s) * scale * inverse_total_};

@@ -24,9 +24,9 @@ namespace limn {
 // near a pole their ratio would be unbounded.) Leaves are as large as this permits. A smooth sky of
 // half a million cells has some thousand. Where the importance is positive, so is the density.
 //
-// A draw selects a block of 64 by 64 cells, then one of its leaves, each by an alias table. The
-// data of bright blocks stay in the cache; a single table of all leaves would be accessed at
-// random.
+// A draw selects a block of 64 by 64 cells by the first number and one of its leaves by the second,
+// each by its cumulative distribution, and places in the leaf by what is left of both: numbers that
+// are spread evenly give draws that are, which alias tables would not.
 class MapDensity {
  public:
   // importance: height by width, finite, not negative, one at least positive; height at least 2.
@@ -52,20 +52,13 @@ class MapDensity {
 
   using Corners = std::array<uint8_t, 4>;  // top left, top right, bottom left, bottom right
 
-  // An alias table has as many equally likely slots as items. The first `share` of a slot belongs
-  // to the item of its index, the rest to the item `alias`.
-  struct Slot {
-    float share = 1;
-    uint32_t alias = 0;
-  };
-  // All data of a leaf that a draw reads, mostly in one cache line.
+  // The data of a leaf, in one cache line.
   struct Leaf {
     float scale;      // converts `corners` to the unnormalised density
     Corners corners;  // at least 1
     uint32_t column;  // of its first cell
     uint32_t row : 28;
     uint32_t log : 4;  // log2 of its side
-    Slot slot;         // in its block's alias table; `alias` is relative to the block
   };
   // A block's leaves are consecutive.
   struct Block {
@@ -89,13 +82,13 @@ class MapDensity {
   const Leaf& leaf(const Square& square, int column, int row) const;
   double solid_angle(const Leaf& leaf) const;  // [sr]
   double mass(const Leaf& leaf) const;         // integral of the unnormalised density
-  void build_aliases();
-  static std::vector<Slot> make_slots(std::span<const double> weights, double total);
-  // Items chosen by u, starting from `first`; u is rescaled to be uniform again. slot_of(item): its
-  // slot.
-  template <class SlotOf>
-  static wide::Ints choose(const SlotOf& slot_of, const wide::Ints& first, const wide::Ints& count,
-                           wide::Doubles& u);
+  void build_distributions();
+  // Puts the share of the weights before each item in place of its weight; 0 if there are none.
+  static void accumulate(std::span<double> weights, double total);
+  // The items chosen by u among `count` (positive, at most `most`) from `first` on, by the shares
+  // of those before them in their lists; u is rescaled to be uniform again.
+  static wide::Ints choose(std::span<const double> before, const wide::Ints& first,
+                           const wide::Ints& count, uint32_t most, wide::Doubles& u);
   class Builder;
 
   int width_, height_, grid_width_;
@@ -103,7 +96,9 @@ class MapDensity {
   HugePageVector<Square> grid_;
   HugePageVector<Leaf> leaves_;
   std::vector<Block> blocks_;
-  std::vector<Slot> block_slots_;
+  uint32_t most_leaves_ = 0;              // of a block
+  std::vector<double> blocks_before_;     // see choose: of all blocks
+  HugePageVector<double> leaves_before_;  // of the leaves of a block
   double inverse_total_ = 0;  // 1 / integral of the unnormalised density over the sphere
 };
 

@@ -3,9 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 
 #include "limn/core/rng.h"
+#include "src/base/angles.h"
+#include "src/light/map_density.h"
 #include "support/environment_maps.h"
 #include "support/quadrature.h"
 
@@ -236,6 +239,27 @@ TEST(Environment, BadInputIsExplained) {
   write_exr(file, image, false, {});
   expect_error(file + ": error: the environment map's pixel (column 2, row 1) is not finite",
                {"emitter", "envmap", {{"filename", file}}});
+}
+
+// Numbers in their order draw blocks of 64 by 64 cells in theirs.
+TEST(MapDensities, AreDrawnInTheOrderOfNumbers) {
+  constexpr int kWidth = 256, kHeight = 129, kNumbers = 1000;
+  std::vector<float> importance;
+  Rng rng(1, 0, 0);
+  for (int i = 0; i < kWidth * kHeight; ++i) {
+    importance.push_back(static_cast<float>(rng.uniform()));
+  }
+  const MapDensity density(kWidth, kHeight, importance);
+  int before = 0;
+  for (int k = 0; k < kNumbers; ++k) {
+    const auto drawn =
+        density.sample(wide::Doubles{} + (k + 0.5) / kNumbers, wide::Doubles{} + rng.uniform());
+    const double y = std::acos(drawn.cos_theta.v[0]) * (kHeight - 1) / kPi;
+    const int block = (y < 64 ? 0 : 4) + static_cast<int>(drawn.x.v[0] / 64);
+    EXPECT_GE(block, before) << k;
+    before = block;
+  }
+  EXPECT_EQ(before, 7);
 }
 
 }  // namespace
