@@ -46,7 +46,7 @@ constexpr double kBetter = 0.9;
 constexpr double kUnseen = 4;
 
 // In the unit of Term::work: 15 to 110 for 6 to 400 pieces, timed in five scenes.
-double list_work(const ListCount& count) {
+double work_of(const ListCount& count) {
   return 10 * static_cast<double>(count.lists) + 0.4 * static_cast<double>(count.pieces);
 }
 
@@ -179,7 +179,7 @@ class Probe {
       const ListCount before = listed_by_thread();
       const BatchSums sums = run_batch(estimator, batch, 1, progress);
       const ListCount now = listed_by_thread();
-      lists[b] = {now.lists - before.lists, now.pieces - before.pieces};
+      lists[b] = {now.lists - before.lists, 0, now.pieces - before.pieces};
       if (sums.costs.empty()) return;  // interrupted: a run without batches
       costs[b] = sums.costs[slot];
       slopes[b] = along_directions(sums.images);
@@ -187,7 +187,7 @@ class Probe {
     TermCost cost;
     for (const TermCost& one : costs) cost.merge(one);
     double listing = 0;
-    for (const ListCount& one : lists) listing += list_work(one);
+    for (const ListCount& one : lists) listing += work_of(one);
     const size_t on_film = FilmBatch(estimator, slot, {0, 0, 1}).count;
     const double count = on_film > 0 ? on_film : kPaths * estimator.samples_of(slot);
     ReverseFigures figures;

@@ -39,10 +39,6 @@ void identify_plan(const std::vector<TermRun>& terms, BatchStore& store) {
   store.identify("choice of the pilot", fingerprint(counts));
 }
 
-// The fewest samples of a term in one of a pixel, where they are spread: a rare event that a pilot
-// has not seen must not cost more than this. Not tuned.
-constexpr double kLeastSamples = 0.125;
-
 // Positions on the film move if, by pilots, that leaves less than this share of squared error times
 // work. Not tuned.
 constexpr double kFilmConvincing = 0.97;
@@ -483,6 +479,14 @@ class TermJob {
     return std::span(parameters_).subspan(p * kLanes, static_cast<size_t>(pass(p).lanes()));
   }
 
+  // Into the mean over parameters, by their variances. figures: before this one's is added.
+  static void add_shares(const DrawShares& shares, double variance, TermFigures& figures) {
+    const double all = figures.variance + variance;
+    const double weight = all > 0 ? variance / all : 0;
+    figures.shares.kept += weight * (shares.kept - figures.shares.kept);
+    figures.shares.power += weight * (shares.power - figures.shares.power);
+  }
+
   // Each parameter counts alike: its variances are divided by their sum. units: these sums.
   std::vector<TermFigures> figures_of(const TermEstimator& estimator, const Probed& probed,
                                       std::vector<double>& units) const {
@@ -493,6 +497,7 @@ class TermJob {
       figures[t].first = pilot.first_work[t];
       figures[t].least = types_[t]->least_samples;
       if (method_.spreads_samples && t != estimator.pixel_slot()) figures[t].least = kLeastSamples;
+      figures[t].on_film = !pilot.in_cells(t);
       if (pilot.in_cells(t)) figures[t].cells.resize(pilot.grid.size());
     }
     for (int lane = 0; lane < estimator.lanes(); ++lane) {
@@ -502,6 +507,7 @@ class TermJob {
       units.push_back(sum);
       if (!(sum > 0)) continue;
       for (size_t t = 0; t < figures.size(); ++t) {
+        add_shares(pilot.shares(t, lane), means[t] / sum, figures[t]);
         figures[t].variance += means[t] / sum;
         for (size_t i = 0; i < cells[t].size(); ++i) figures[t].cells[i] += cells[t][i] / sum;
       }

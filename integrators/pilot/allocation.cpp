@@ -26,56 +26,63 @@ constexpr int kSpreadRadii[] = {2, 4};  // windows of 5 by 5 and 9 by 9 cells
 constexpr double kLeastShare = 0.25;    // of the mean; not tuned
 constexpr int kMostInPixel = 64;        // not tuned
 // A plan whose product is this close to the best has counts that are large enough. Short samples
-// leave less behind when a run is stopped.
-constexpr double kRounding = 1.1;
-// The same for terms of the film, once the other counts are chosen. Their samples are stratified
-// over a batch, so that more of them at once leave less variance than the pilot's figures say.
-// Against 1.1, squared error times time is 0.6 (a cube under a spot), 0.7 (a small light), 0.83
-// (demo), 0.85 (plant), 1.14 (a fence) and 1.16 (a glass pane; without the noisiest hundredth of
-// pixels 0.95 and 1).
-constexpr double kFilmRounding = 1.03;
+// leave less behind when a run is stopped. Against 1.1, squared error times time is 0.76 to 0.97
+// (a lamp moves, in a room and alone; an object in that room).
+constexpr double kRounding = 1.03;
 
-// Counts before rounding, up to a common factor; empty for a term of the film.
+// Counts before rounding, at the scale 1; empty for a term of the film.
 struct Wish {
-  std::vector<double> cells;
+  std::vector<double> cells;     // where they are 1 or more
+  std::vector<double> rare;      // where they are less
   std::vector<double> variance;  // of the same cells, smoothed
 };
 
+void raise_to_least_share(std::vector<double>& counts) {
+  const double mean =
+      std::accumulate(counts.begin(), counts.end(), 0.0) / static_cast<double>(counts.size());
+  for (double& count : counts) count = std::max(count, kLeastShare * mean);
+}
+
+// Each is where one more sample is worth its work: v (1 - kept) power / n^(power + 1) = price c.
+// The scale is price^(-1/2).
 Wish wish_of(const TermFigures& term, const PlanGrid& grid) {
   Wish wish;
-  const double deviation = std::sqrt(term.variance);
-  // Of further samples.
-  const double price = term.cost > 0 ? std::sqrt(term.cost - term.first) : 0;
   if (term.cells.empty()) return wish;
-  if (!(deviation > 0)) {
-    // What a pilot has not seen may be there: one sample, whatever the scale.
-    wish.variance.assign(grid.size(), 0);
-    wish.cells.assign(grid.size(), 0);
-    return wish;
-  }
   wish.variance.assign(grid.size(), 0);
+  wish.cells.assign(grid.size(), 0);
+  wish.rare.assign(grid.size(), 0);
+  // What a pilot has not seen may be there: one sample, whatever the scale.
+  if (!(term.variance > 0)) return wish;
   for (const int radius : kSpreadRadii) {
     const std::vector<double> means = window_means(grid, term.cells, radius);
     for (size_t i = 0; i < grid.size(); ++i) {
       wish.variance[i] += std::max(means[i], 0.0) / std::size(kSpreadRadii);
     }
   }
-  double mean = 0;
-  for (const double v : wish.variance) {
-    wish.cells.push_back(price > 0 ? std::sqrt(v) / price : 0);
-    mean += wish.cells.back() / static_cast<double>(grid.size());
+  if (!(term.cost > 0)) return wish;
+  const auto& [kept, power] = term.shares;
+  for (size_t i = 0; i < grid.size(); ++i) {
+    const double drawn = wish.variance[i] * (1 - kept) * power;
+    wish.cells[i] = std::pow(drawn / (term.cost - term.first), 1 / (power + 1));
+    wish.rare[i] = std::sqrt(wish.variance[i] / term.cost);
   }
-  for (double& share : wish.cells) share = std::max(share, kLeastShare * mean);
+  raise_to_least_share(wish.cells);
+  raise_to_least_share(wish.rare);
   return wish;
 }
 
-// The number nearest to `count` that a pixel can have.
-double possible(const TermFigures& term, double count) {
+double count_at(const TermFigures& term, double wish, double scale) {
+  return term.shares.power == 1 ? wish * scale
+                                : wish * std::pow(scale, 2 / (term.shares.power + 1));
+}
+
+// The number nearest to what is wished for that a pixel can have.
+double possible(const TermFigures& term, const Wish& wish, size_t cell, double scale) {
   if (!(term.variance > 0)) return 1;
-  const double rare = term.cost > 0 ? count * std::sqrt(1 - term.first / term.cost) : count;
+  const double rare = scale * wish.rare[cell];
   if (rare < 0.75) return std::max(rare, term.least);
   if (rare < 1) return 1;
-  return std::clamp(std::round(count), 1.0, double{kMostInPixel});
+  return std::clamp(std::round(count_at(term, wish.cells[cell], scale)), 1.0, double{kMostInPixel});
 }
 
 struct Totals {
@@ -96,8 +103,8 @@ Totals totals_of_cells(const std::vector<TermFigures>& terms, const std::vector<
   for (size_t t = 0; t < terms.size(); ++t) {
     const double each = 1.0 / static_cast<double>(wishes[t].cells.size());
     for (size_t i = 0; i < wishes[t].cells.size(); ++i) {
-      const double n = possible(terms[t], scale * wishes[t].cells[i]);
-      totals.error += each * wishes[t].variance[i] / n;
+      const double n = possible(terms[t], wishes[t], i, scale);
+      totals.error += each * wishes[t].variance[i] * terms[t].left_by(n);
       totals.cost += each * terms[t].cost_of(n);
     }
   }
@@ -105,26 +112,28 @@ Totals totals_of_cells(const std::vector<TermFigures>& terms, const std::vector<
 }
 
 // The count of a term of the film beside `others`: the smallest whose product is that close to the
-// least (rounding), or the largest that costs no more than is left of `most`; the fewest if none is
+// least, or the largest that costs no more than is left of `most`; the fewest if none is
 // that cheap.
-double best_on_film(const TermFigures& term, const Totals& others, double most, double rounding) {
+double best_on_film(const TermFigures& term, const Totals& others, double most) {
   if (!(term.variance > 0)) return term.least;
   constexpr double kStep = 1.189207115002721;  // the fourth root of 2
   const auto cost = [&](double n) { return others.cost + term.cost_of(n); };
-  const auto product = [&](double n) { return (others.error + term.variance / n) * cost(n); };
+  const auto product = [&](double n) {
+    return (others.error + term.variance * term.left_by(n)) * cost(n);
+  };
   double least = std::numeric_limits<double>::infinity();
   for (double n = term.least; n <= kMostInPixel; n *= kStep) least = std::min(least, product(n));
   double n = term.least;
-  while (product(n) > rounding * least && cost(n * kStep) <= most) n *= kStep;
+  while (product(n) > kRounding * least && cost(n * kStep) <= most) n *= kStep;
   return n;
 }
 
 ScaledPlan plan_at(const std::vector<TermFigures>& terms, const std::vector<Wish>& wishes,
-                   double scale, double most, double rounding = kRounding) {
+                   double scale, double most) {
   ScaledPlan plan{totals_of_cells(terms, wishes, scale), std::vector<double>(terms.size())};
   Totals& sum = plan.totals;
   const auto add = [&](size_t t, double sign) {
-    sum.error += sign * terms[t].variance / plan.film[t];
+    sum.error += sign * terms[t].variance * terms[t].left_by(plan.film[t]);
     sum.cost += sign * terms[t].cost_of(plan.film[t]);
   };
   for (size_t t = 0; t < terms.size(); ++t) {
@@ -137,7 +146,7 @@ ScaledPlan plan_at(const std::vector<TermFigures>& terms, const std::vector<Wish
     for (size_t t = 0; t < terms.size(); ++t) {
       if (!wishes[t].cells.empty()) continue;
       add(t, -1);
-      plan.film[t] = best_on_film(terms[t], sum, most, rounding);
+      plan.film[t] = best_on_film(terms[t], sum, most);
       add(t, 1);
     }
   }
@@ -160,17 +169,29 @@ double fitting_scale(const std::vector<TermFigures>& terms, const std::vector<Wi
   return fits;
 }
 
+// The scale at which the largest count of any cell is so large.
+double scale_of(const std::vector<TermFigures>& terms, const std::vector<Wish>& wishes,
+                double count) {
+  double scale = kNoLimit;
+  for (size_t t = 0; t < terms.size(); ++t) {
+    for (const double wish : wishes[t].cells) {
+      if (wish > 0) {
+        scale = std::min(scale, std::pow(count / wish, (terms[t].shares.power + 1) / 2));
+      }
+    }
+  }
+  return scale;
+}
+
 // 0 where no term of cells varies.
 double best_scale(const std::vector<TermFigures>& terms, const std::vector<Wish>& wishes) {
-  double largest = 0;
-  for (const Wish& wish : wishes) {
-    for (const double share : wish.cells) largest = std::max(largest, share);
-  }
-  if (!(largest > 0)) return 0;
+  const double smallest = scale_of(terms, wishes, 0.5);
+  if (smallest == kNoLimit) return 0;
+  const double largest = scale_of(terms, wishes, kMostInPixel);
   std::vector<double> scales, products;
-  for (double most = 0.5; most <= kMostInPixel; most *= std::sqrt(2.0)) {
-    scales.push_back(most / largest);
-    products.push_back(plan_at(terms, wishes, scales.back(), kNoLimit).totals.product());
+  for (double scale = smallest; scale <= largest; scale *= std::sqrt(2.0)) {
+    scales.push_back(scale);
+    products.push_back(plan_at(terms, wishes, scale, kNoLimit).totals.product());
   }
   const double least = *std::min_element(products.begin(), products.end());
   for (size_t i = 0; i < scales.size(); ++i) {
@@ -204,11 +225,11 @@ SampleCounts best_samples(const std::vector<TermFigures>& figures, double most) 
     const TermFigures& term = figures[t];
     const std::vector<double> counts = counts_to_try(term);
     samples.push_back(counts.front());
-    variance += term.variance / counts.front();
+    variance += term.variance * term.left_by(counts.front());
     cost += term.cost_of(counts.front());
     for (size_t i = 1; i < counts.size(); ++i) {
       const double fewer = counts[i - 1], more = counts[i];
-      const double lost = term.variance / fewer - term.variance / more;
+      const double lost = term.variance * (term.left_by(fewer) - term.left_by(more));
       steps.push_back({lost / (term.cost_of(more) - term.cost_of(fewer)), t, more});
     }
   }
@@ -218,7 +239,7 @@ SampleCounts best_samples(const std::vector<TermFigures>& figures, double most) 
   std::vector<double> best = samples;
   for (const Step& step : steps) {
     const TermFigures& term = figures[step.term];
-    variance += term.variance * (1 / step.count - 1 / samples[step.term]);
+    variance += term.variance * (term.left_by(step.count) - term.left_by(samples[step.term]));
     cost += term.cost_of(step.count) - term.cost_of(samples[step.term]);
     samples[step.term] = step.count;
     if (cost > most) break;
@@ -236,7 +257,7 @@ double spread_samples(const std::vector<TermFigures>& figures, const PlanGrid& g
   const auto varies = [](const TermFigures& term) { return term.variance > 0 && term.cost > 0; };
   if (std::none_of(figures.begin(), figures.end(), varies)) return 0;
   const double scale = fitting_scale(figures, wishes, best_scale(figures, wishes), most);
-  const ScaledPlan scaled = plan_at(figures, wishes, scale, most, kFilmRounding);
+  const ScaledPlan scaled = plan_at(figures, wishes, scale, most);
   plan.grid = grid;
   plan.counts.assign(grid.size(), {});
   std::vector<double> means;
@@ -247,7 +268,7 @@ double spread_samples(const std::vector<TermFigures>& figures, const PlanGrid& g
     }
     double sum = 0;
     for (size_t i = 0; i < grid.size(); ++i) {
-      plan.counts[i][t] = static_cast<float>(possible(figures[t], scale * wishes[t].cells[i]));
+      plan.counts[i][t] = static_cast<float>(possible(figures[t], wishes[t], i, scale));
       sum += plan.counts[i][t];
     }
     means.push_back(sum / static_cast<double>(grid.size()));
@@ -256,13 +277,26 @@ double spread_samples(const std::vector<TermFigures>& figures, const PlanGrid& g
   return scaled.totals.error / scaled.totals.cost;
 }
 
-double price_of(const std::vector<TermFigures>& figures, const SampleCounts& counts) {
-  double error = 0, cost = 0;
+namespace {
+
+Totals totals_of(const std::vector<TermFigures>& figures, const SampleCounts& counts) {
+  Totals totals;
   for (size_t t = 0; t < figures.size(); ++t) {
-    error += figures[t].variance / counts[t];
-    cost += figures[t].cost_of(counts[t]);
+    totals.error += figures[t].variance * figures[t].left_by(counts[t]);
+    totals.cost += figures[t].cost_of(counts[t]);
   }
-  return cost > 0 ? error / cost : 0;
+  return totals;
+}
+
+}  // namespace
+
+double price_of(const std::vector<TermFigures>& figures, const SampleCounts& counts) {
+  const Totals totals = totals_of(figures, counts);
+  return totals.cost > 0 ? totals.error / totals.cost : 0;
+}
+
+double least_error_times_cost(const std::vector<TermFigures>& figures) {
+  return totals_of(figures, best_samples(figures)).product();
 }
 
 Lanes survival_of(const TracedDraws& traced, double price, std::span<const double> units) {

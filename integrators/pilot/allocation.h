@@ -1,14 +1,20 @@
 #pragma once
 // How a job's work is shared among the terms of a derivative, and among the pixels.
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <span>
 #include <vector>
 
+#include "integrators/pilot/pilot_moments.h"
 #include "integrators/pilot/sample_plan.h"
 #include "integrators/terms/lane_sinks.h"
 
 namespace limn {
+
+// The fewest samples of a term in one of a pixel, where they are spread: a rare event that a pilot
+// has not seen must not cost more than this. Not tuned.
+inline constexpr double kLeastSamples = 0.125;
 
 inline constexpr double kNoLimit = std::numeric_limits<double>::infinity();
 
@@ -25,6 +31,14 @@ struct TermFigures {
   std::vector<double> cells = {};
   // Of the cost, never all: what further samples at the same vertices do not take again.
   double first = 0;
+  DrawShares shares = {};  // of the variance
+  bool on_film = false;    // its samples are stratified over the film, also where they are few
+
+  // Of the variance, what so many samples leave.
+  double left_by(double samples) const {
+    if (samples <= 1 && !on_film) return 1 / samples;
+    return shares.kept + (1 - shares.kept) * std::pow(samples, -shares.power);
+  }
 
   double cost_of(double samples) const {
     return cost * samples - first * std::max(samples - 1, 0.0);
@@ -38,10 +52,13 @@ struct TermFigures {
 // the cheapest.
 SampleCounts best_samples(const std::vector<TermFigures>& figures, double most = kNoLimit);
 
-// The same for every cell. The ideal share of a cell goes with the standard deviation there; a
-// pilot sees that too rarely in one cell, so the variance is the mean of those over 5 by 5 and 9 by
-// 9 cells, and a share is a quarter of the mean at least. Counts are whole; they are as small as
-// rounding allows.
+// Squared error times cost with these.
+double least_error_times_cost(const std::vector<TermFigures>& figures);
+
+// The same as best_samples for every cell. The ideal share of a cell goes with the standard
+// deviation there; a pilot sees that too rarely in one cell, so the variance is the mean of those
+// over 5 by 5 and 9 by 9 cells, and a share is a quarter of the mean at least. Counts are whole;
+// they are as small as rounding allows.
 // The result is the price of work, the Lagrange multiplier of the plan: how much of the squared
 // error a unit of work is worth in it, 0 if there is none. most: see best_samples; the mean over
 // cells.

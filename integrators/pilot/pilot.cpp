@@ -15,7 +15,9 @@ class PilotEstimator final : public ProbingEstimator {
       : ProbingEstimator(terms), grid_(terms.scene().film, pixels), turns_(turns) {
     for (size_t slot = 0; slot < terms.slots(); ++slot) {
       sums_.emplace_back(terms.adds_to_pixels(slot) ? grid_.size() : 0, terms.lanes());
+      pairs_.emplace_back(terms.draws_at_vertices(slot) ? grid_.size() : 0, terms.lanes());
     }
+    listing_.resize(grid_.size() * terms.slots());
     traced_.resize(grid_.size());
   }
 
@@ -26,9 +28,22 @@ class PilotEstimator final : public ProbingEstimator {
   double share() const {
     return static_cast<double>(grid_.size()) / (static_cast<double>(film_size(scene().film)) / 3);
   }
-  double film_samples(size_t slot) const override { return terms_.film_samples(slot) * share(); }
+  double film_samples(size_t slot) const override {
+    const bool fewer = fewer_ && !terms_.adds_to_pixels(slot);
+    return terms_.film_samples(slot) * share() * (fewer ? kFewer : 1);
+  }
+  // Terms of the film alone have fewer samples: what stratification makes of more is seen.
+  static constexpr double kFewer = 0.25;
+  void take_fewer(bool fewer) { fewer_ = fewer; }
 
   const PlanGrid& grid() const { return grid_; }
+  const std::vector<PairSums>& pairs() const { return pairs_; }
+  // Of all samples.
+  double listing(size_t slot) const {
+    double sum = 0;
+    for (size_t cell = 0; cell < grid_.size(); ++cell) sum += listing_[cell * slots() + slot];
+    return sum;
+  }
   TracedDraws traced() const {
     TracedDraws sum;
     for (const TracedDraws& cell : traced_) sum.add(cell);
@@ -42,31 +57,44 @@ class PilotEstimator final : public ProbingEstimator {
   }
 
  private:
+  // A share of the cells tells enough, and second draws take time.
+  bool draws_pairs(size_t cell) const {
+    constexpr size_t kPairs = 1024;  // not tuned
+    const size_t each = (grid_.size() + kPairs - 1) / kPairs;
+    return (cell % grid_.columns + 3 * (cell / grid_.columns)) % each == 0;
+  }
   void add_pixel(const PixelSample& at, const Rng& key, SampleSink& sink) const {
     if (!grid_.is_probe(scene().film, at.x, at.y)) return;
-    const TermEstimator::Sample sample = terms_.sample(at, key, turns_, sink);
-    if (!sample.finite) return;
     const size_t cell = grid_.index(at.x, at.y);
+    const bool pair = draws_pairs(cell);
+    const TermEstimator::Sample sample = terms_.sample(at, key, turns_, pair, sink);
+    if (!sample.finite) return;
     for (size_t slot = 0; slot < slots(); ++slot) {
       if (!sums_[slot].empty()) sums_[slot].add(cell, sample.terms[slot]);
+      if (!terms_.draws_at_vertices(slot)) continue;
+      listing_[cell * slots() + slot] += sample.listing[slot];
+      if (pair) pairs_[slot].add(cell, sample.pair[slot][0], sample.pair[slot][1]);
     }
     traced_[cell].add(sample.traced);
   }
 
   PlanGrid grid_;
   bool turns_;
+  bool fewer_ = false;
   // Of every slot; a cell is written by the thread of its tile alone.
   mutable std::vector<CellSums> sums_;
   mutable std::vector<TracedDraws> traced_;
+  mutable std::vector<PairSums> pairs_;  // of every slot
+  mutable std::vector<double> listing_;  // [cell][slot]
 };
 
 // Sums up batches.
 class PilotRun {
  public:
   PilotRun(const TermEstimator& terms, std::unique_ptr<PilotEstimator> pilot)
-      : terms_(terms), costs_(terms.slots()) {
-    for (size_t i = 0; i < terms.slots() * terms.lanes(); ++i) {
-      film_.emplace_back(film_size(terms.scene().film));
+      : terms_(terms), pilot_(*pilot), costs_(terms.slots()) {
+    for (auto& film : film_) {
+      film.assign(terms.slots() * terms.lanes(), Moments(film_size(terms.scene().film)));
     }
     estimators_.push_back(std::move(pilot));
   }
@@ -79,53 +107,70 @@ class PilotRun {
     ProgressCounter progress(quiet, watch, 1);
     constexpr uint64_t kStream = 0x9110;  // any number
     for (int sample = first; sample < last; ++sample) {
+      pilot_.take_fewer(sample % 2 == 1);
       const Batch batch{mix_bits(settings.seed + kStream), sample, sample + 1};
       const auto sums = run_batch(estimators_, batch, settings.threads, progress);
       if (sums.empty()) return false;
       for (size_t slot = 0; slot < costs_.size(); ++slot) costs_[slot].merge(sums[0].costs[slot]);
-      for (size_t i = 0; i < film_.size(); ++i) film_[i].add_batch(sums[0].images[i], 1);
+      std::vector<Moments>& film = film_[sample % 2];
+      for (size_t i = 0; i < film.size(); ++i) film[i].add_batch(sums[0].images[i], 1);
     }
     return true;
   }
 
   // seconds: of all batches.
-  void add_work(int spp, size_t probes, double seconds, PilotFigures& figures) const {
+  void add_work(int spp, double seconds, PilotFigures& figures) const {
     double all = 0;
     for (size_t slot = 0; slot < costs_.size(); ++slot) {
-      const double samples = static_cast<double>(spp) * static_cast<double>(probes);
-      const double work = terms_.work(slot, costs_[slot]);
-      figures.work.push_back(work / samples);
-      figures.first_work.push_back(terms_.first_work(slot, costs_[slot]) / samples);
+      const double samples = static_cast<double>(spp) * static_cast<double>(pilot_.grid().size());
+      const double listing = pilot_.listing(slot);
+      const double work = terms_.work(slot, costs_[slot]) + listing;
+      const double film_share = terms_.adds_to_pixels(slot) ? 1 : (1 + PilotEstimator::kFewer) / 2;
+      figures.work.push_back(work / (samples * film_share));
+      figures.first_work.push_back((terms_.first_work(slot, costs_[slot]) + listing) / samples);
       all += work;
     }
     figures.seconds_of_work = all > 0 ? seconds / all : 0;
   }
 
-  // A thousandth of the pixels, those with the largest variance, is left out: single bright samples
+  // A thousandth of the pixels that vary, those that do most, is left out: single bright samples
   // would rule the choice. share: of a sample that each pixel had.
-  Lanes film_variance(size_t slot, double share) const {
+  Lanes film_variance(size_t slot, double share, bool fewer = false) const {
     Lanes result;
     for (int lane = 0; lane < terms_.lanes(); ++lane) {
-      const Moments& moments = film_[slot * terms_.lanes() + lane];
+      const Moments& moments = film_[fewer][slot * terms_.lanes() + lane];
       std::vector<double> variances(moments.size() / 3);
       for (size_t i = 0; i < moments.size(); ++i) {
         variances[i / 3] += moments.variance(i) * static_cast<double>(moments.samples());
       }
       std::sort(variances.begin(), variances.end());
-      const size_t kept = variances.size() - variances.size() / 1000;
+      const auto seen = static_cast<size_t>(
+          variances.end() - std::upper_bound(variances.begin(), variances.end(), 0.0));
+      const size_t kept = variances.size() - seen / 1000;
       for (size_t i = 0; i < kept; ++i) result[lane] += variances[i] / static_cast<double>(kept);
       result[lane] *= share;
     }
     return result;
   }
 
- private:
-  const Film& film() const { return terms_.scene().film; }
+  // See DrawShares; of terms of the film alone.
+  Lanes film_power(size_t slot) const {
+    const Lanes more = film_variance(slot, 1), fewer = film_variance(slot, 1, true);
+    Lanes power;
+    for (int lane = 0; lane < terms_.lanes(); ++lane) {
+      const double gain = more[lane] > 0 ? fewer[lane] / more[lane] : 1;
+      power[lane] =
+          gain > 1 ? std::clamp(-std::log(gain) / std::log(PilotEstimator::kFewer), 1.0, 2.0) : 1;
+    }
+    return power;
+  }
 
+ private:
   const TermEstimator& terms_;
+  PilotEstimator& pilot_;
   std::vector<std::unique_ptr<SampleEstimator>> estimators_;
   std::vector<TermCost> costs_;
-  std::vector<Moments> film_;
+  std::vector<Moments> film_[2];  // of the film's usual samples, and of fewer
 };
 
 }  // namespace
@@ -158,9 +203,13 @@ void PilotFigures::merge(const PilotFigures& more) {
   for (size_t slot = 0; slot < work.size(); ++slot) {
     mix(work[slot], more.work[slot]);
     mix(first_work[slot], more.first_work[slot]);
-    for (int k = 0; k < kLanes; ++k) mix(film_variance[slot][k], more.film_variance[slot][k]);
+    for (int k = 0; k < kLanes; ++k) {
+      mix(film_variance[slot][k], more.film_variance[slot][k]);
+      mix(film_power[slot][k], more.film_power[slot][k]);
+    }
   }
   mix(seconds_of_work, more.seconds_of_work);
+  for (size_t slot = 0; slot < pairs.size(); ++slot) pairs[slot].merge(more.pairs[slot]);
   traced.add(more.traced);
   spp = sum;
 }
@@ -201,12 +250,15 @@ PilotFigures run_pilot(const TermEstimator& estimator, bool turns, PilotSamples 
   figures.halves[1] = pilot.take_covariances(half);
   figures.spp = spp;
   figures.grid = pilot.grid();
+  figures.pixel_slot = estimator.pixel_slot();
   const double share = pilot.share();
   figures.traced = pilot.traced();
-  run.add_work(spp, figures.grid.size(), watch.seconds() - began, figures);
+  figures.pairs = pilot.pairs();
+  run.add_work(spp, watch.seconds() - began, figures);
   for (size_t slot = 0; slot < estimator.slots(); ++slot) {
     figures.film_variance.push_back(
         estimator.film_samples(slot) > 0 ? run.film_variance(slot, share) : Lanes{});
+    figures.film_power.push_back(run.film_power(slot));
   }
   return figures;
 }

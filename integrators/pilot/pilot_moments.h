@@ -83,4 +83,32 @@ class CellSums {
   CellCovariances second_;
 };
 
+// What several samples at the vertices of a path leave of the variance of one: the share of the
+// path, and of the rest samples^-power, which is 1 for independent draws and up to 2 for stratified
+// ones.
+struct DrawShares {
+  double kept = 0;
+  double power = 1;
+};
+
+// Sums over paths whose vertices have one sample, x_1, and the mean of two others, x_2.
+class PairSums {
+ public:
+  PairSums(size_t cells, int parameters) : parameters_(parameters), cells_(cells * parameters) {}
+
+  void add(size_t cell, const Rgb<Lanes>& one, const Rgb<Lanes>& two);
+  // Without the thousandth of the cells that varies most.
+  DrawShares shares(int parameter) const;
+  void merge(const PairSums& other);
+
+ private:
+  struct Cell {
+    int samples = 0;
+    float sums[2][3] = {};   // by channel
+    float products[3] = {};  // x_1^2, x_2^2, x_1 x_2, summed over channels
+  };
+  int parameters_;
+  std::vector<Cell> cells_;
+};
+
 }  // namespace limn

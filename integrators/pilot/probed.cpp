@@ -31,11 +31,16 @@ double Probed::error_times_work(int parameters, bool turned) const {
   for (int lane = 0; lane < parameters; ++lane) {
     std::vector<std::vector<double>> cells;
     const std::vector<double> means = variances(lane, cells, turned);
-    double sum = 0;
-    for (size_t slot = 0; slot < means.size(); ++slot)
-      sum += std::sqrt(std::max(means[slot], 0.0) * pilot.work[slot]);
-    if (!(sum > 0)) return 0;
-    product *= std::pow(sum, 2.0 / parameters);
+    std::vector<TermFigures> figures(means.size());
+    for (size_t slot = 0; slot < means.size(); ++slot) {
+      figures[slot] = {.variance = std::max(means[slot], 0.0),
+                       .cost = pilot.work[slot],
+                       .least = slot == pilot.pixel_slot ? 1 : kLeastSamples,
+                       .first = pilot.first_work[slot],
+                       .shares = pilot.shares(slot, lane),
+                       .on_film = !pilot.in_cells(slot)};
+    }
+    product *= std::pow(least_error_times_cost(figures), 1.0 / parameters);
   }
   return product;
 }

@@ -367,7 +367,7 @@ Rgb<Lanes> TermEstimator::at_rest(const Rgb<Lanes>& turning, const Rgb<Lanes>& t
 // more a path is traced twice, first with directions at rest; but terms at vertices draw edges by
 // how fast these move, so they evaluate both at once.
 TermEstimator::Sample TermEstimator::sample(const PixelSample& at, const Rng& key, bool turns,
-                                            SampleSink& sink) const {
+                                            bool again, SampleSink& sink) const {
   PixelCounts ones;
   ones.fill(1);
   const bool twice = turns && lanes_ > 1;
@@ -380,6 +380,7 @@ TermEstimator::Sample TermEstimator::sample(const PixelSample& at, const Rng& ke
   }
   TracedDraws traced;
   VertexTerms vertices(*this, ones, twice ? &motions : nullptr, &traced, sink);
+  if (again) vertices.draw_twice();
   const auto trace_at = [&](bool mirrored) {
     return trace_one({at, mirrored}, key, turns ? &turning_ : nullptr, vertices, nullptr,
                      sink.cost(pixel_slot_), twice);
@@ -394,7 +395,8 @@ TermEstimator::Sample TermEstimator::sample(const PixelSample& at, const Rng& ke
     if (!turns) return TurnedSample{turning, {}, {}};
     return TurnedSample{twice ? resting : turning, turned(turning, resting), {}};
   };
-  Sample sample{value(path.found.radiance), {}, traced, path.finite && (!twice || held.finite)};
+  Sample sample{
+      value(path.found.radiance), {}, {}, {}, traced, path.finite && (!twice || held.finite)};
   for (size_t slot = 0; slot < terms_.size(); ++slot) {
     const Term* term = terms_[slot].get();
     if (!term) continue;
@@ -405,6 +407,8 @@ TermEstimator::Sample TermEstimator::sample(const PixelSample& at, const Rng& ke
       const Rgb<Lanes>& sum = vertices.sum(slot);
       to = twice ? TurnedSample{at_rest(sum, vertices.turned(slot)), vertices.turned(slot), {}}
                  : split(sum, {});
+      sample.pair[slot] = {sum, vertices.again(slot)};
+      sample.listing[slot] = vertices.listing(slot);
     }
     if (term->uses_moved_pixels()) to.value = sample_moved_pixel(slot, at, key, sink);
     if (turns && slot == pixel_slot_) to.scores = turned(path.found.score, {});

@@ -64,16 +64,25 @@ class TermEstimator final : public SampleEstimator {
                             terms_[slot]->uses_moved_pixels());
   }
 
+  bool draws_at_vertices(size_t slot) const {
+    return terms_[slot] && terms_[slot]->uses_vertices();
+  }
+
   // One path with one sample of every term at its vertices.
   struct Sample {
     Rgb<double> radiance;
     std::array<TurnedSample, kMostTerms> terms;  // of each slot; zero for those of the film
+    // Of terms at vertices, where asked for: two draws at those of one path.
+    std::array<std::array<Rgb<Lanes>, 2>, kMostTerms> pair;
+    std::array<double, kMostTerms> listing;  // work of lists of silhouettes
     TracedDraws traced;
     bool finite;
   };
   // turns: whether turns of directions at the first vertex are looked at; the values are those of
   // directions at rest.
-  Sample sample(const PixelSample& at, const Rng& key, bool turns, SampleSink& sink) const;
+  // again: whether terms draw twice at the vertices.
+  Sample sample(const PixelSample& at, const Rng& key, bool turns, bool again,
+                SampleSink& sink) const;
 
   const Scene& scene() const override { return scene_; }
   size_t slots() const override { return types_.size(); }

@@ -9,6 +9,7 @@
 
 #include "integrators/paths/path_log.h"
 #include "integrators/pilot/term_estimator.h"
+#include "integrators/terms/direct_edges.h"
 #include "integrators/terms/vertex_edges.h"
 
 namespace limn {
@@ -63,6 +64,11 @@ class TermEstimator::VertexTerms {
   const PixelCounts& counts() const { return counts_; }
   const Rgb<Lanes>& sum(size_t slot) const { return sums_[slot]; }
   const Rgb<Lanes>& turned(size_t slot) const { return turned_[slot]; }
+  // Has two other samples at the same vertices, see PairSums. They are not booked.
+  void draw_twice() { twice_ = true; }
+  const Rgb<Lanes>& again(size_t slot) const { return again_[slot]; }
+  // What lists of silhouettes took, in the unit of Term::work.
+  double listing(size_t slot) const { return listing_[slot]; }
 
  private:
   // How the path came to a vertex.
@@ -96,20 +102,41 @@ class TermEstimator::VertexTerms {
       const Stopwatch watch;
       TermCost& cost = sink_.cost(slot);
       lanes.start(cost, estimator_.plan_.survival * (1 / (factor * counts_[slot])));
-      Rgb<Lanes> sum;
-      try {
-        term->add_at_vertex(vertex, samples, lanes);
-        sum = lanes.sum();
-      } catch (const UntraceableRay&) {
-        sum = grey(kNotFinite);
-      }
+      const double listed = list_work(listed_by_thread());
+      const Rgb<Lanes> sum = drawn(*term, vertex, samples, lanes);
+      listing_[slot] += list_work(listed_by_thread()) - listed;
       const double share = 1 / factor;
       for (int c = 0; c < 3; ++c) {
         sums_[slot][c] += sum[c] * share;
         turned_[slot][c] += turned.sum[c] * share;
       }
+      if (twice_) draw_again(slot, vertex, surface, samples, share / 2);
       cost.seconds += watch.seconds();
     }
+  }
+  static Rgb<Lanes> drawn(const Term& term, const PathVertex& vertex, int samples,
+                          VertexLanes& lanes) {
+    try {
+      term.add_at_vertex(vertex, samples, lanes);
+    } catch (const UntraceableRay&) {
+      return grey(kNotFinite);
+    }
+    return lanes.sum();
+  }
+  void draw_again(size_t slot, const PathVertex& at, const SurfacePoint<Dual>& surface, int samples,
+                  double share) {
+    constexpr uint64_t kAgain = 0x20000;  // no depth of a path
+    const Rng key = at.key.at(Purpose::kVertexSplit, kAgain);
+    PathVertex vertex{at.surface, at.scattering, at.throughput, at.velocity,
+                      at.turn,    at.bounces,    at.step,       key};
+    vertex.below = at.below;
+    VertexLanes::Setting setting = setting_;
+    setting.traced = nullptr;
+    VertexLanes lanes(setting, vertex, surface, nullptr);
+    TermCost cost;
+    lanes.start(cost, {});
+    const Rgb<Lanes> sum = drawn(*estimator_.terms_[slot], vertex, 2 * samples, lanes);
+    for (int c = 0; c < 3; ++c) again_[slot][c] += sum[c] * share;
   }
   TurnedVertex turned_at(const SurfacePoint<Dual>& surface, const DirectionMotion* motion,
                          int bounces) const {
@@ -151,6 +178,9 @@ class TermEstimator::VertexTerms {
   SampleSink& sink_;
   std::array<Rgb<Lanes>, kMostTerms> sums_;
   std::array<Rgb<Lanes>, kMostTerms> turned_;
+  std::array<Rgb<Lanes>, kMostTerms> again_{};
+  std::array<double, kMostTerms> listing_{};
+  bool twice_ = false;
   Vec3d first_;  // vertex of the path
 };
 

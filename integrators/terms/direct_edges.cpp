@@ -51,6 +51,10 @@ thread_local ListCount listed_here;
 
 ListCount listed_by_thread() { return listed_here; }
 
+double list_work(const ListCount& count) {
+  return 2 * static_cast<double>(count.cones) + 0.25 * static_cast<double>(count.pieces);
+}
+
 void DirectEdges::list(const EdgeQuery& emitters, const EdgeQuery& patches, double u,
                        DirectPieces& to) const {
   static thread_local std::vector<LightRegions::Choice> choices;
@@ -68,6 +72,7 @@ void DirectEdges::list(const EdgeQuery& emitters, const EdgeQuery& patches, doub
     const EdgeQuery& query = regions_.shape(k).valid() ? emitters : patches;
     const std::optional<DirectionCone> cone = regions_.cone(k, query.p, query.n);
     if (!cone) continue;
+    ++listed_here.cones;
     listed.clear();
     pieces.clear();
     sampler_.list_outlines(query, *cone, listed);

@@ -222,6 +222,76 @@ TEST(SpreadSamples, KnowTermsOfTheFilm) {
   }
 }
 
+// Further samples leave what the path does, and stratified ones take out more of the rest. By brute
+// force over the counts of a path and of samples at its vertices.
+TEST(SpreadSamples, KnowWhatFurtherOnesLeave) {
+  PlanGrid grid;
+  grid.columns = grid.rows = 10;
+  for (const double kept : {0.0, 0.1, 0.9}) {
+    for (const double power : {1.0, 2.0}) {
+      for (const double variance : {0.1, 5.0}) {
+        const auto cells = [&](double v) { return std::vector<double>(grid.size(), v); };
+        const std::vector<TermFigures> figures = {
+            {1, 3, 1, cells(1)}, {variance, 1, 0.125, cells(variance), 0, {kept, power}}};
+        const auto product = [&](double a, double b) {
+          const double left = b > 1 ? kept + (1 - kept) * std::pow(b, -power) : 1 / b;
+          return (1 / a + variance * left) * (3 * a + b);
+        };
+        double least = std::numeric_limits<double>::infinity();
+        for (int a = 1; a <= 64; ++a) {
+          for (double b = 0.125; b < 1; b *= 1.1) least = std::min(least, product(a, b));
+          for (int b = 1; b <= 64; ++b) least = std::min(least, product(a, b));
+        }
+        SamplePlan plan;
+        spread_samples(figures, grid, plan);
+        EXPECT_LE(product(plan.counts[0][0], plan.counts[0][1]), 1.1 * least)
+            << kept << " " << power << " " << variance;
+      }
+    }
+  }
+}
+
+// Lines that are stratified over the film: fewer leave more than their share.
+TEST(SpreadSamples, KnowStrataOfTheFilm) {
+  PlanGrid grid;
+  grid.columns = grid.rows = 10;
+  TermFigures lines{0.01, 3, 0.125};
+  lines.shares.power = 2;
+  lines.on_film = true;
+  const std::vector<TermFigures> figures = {{1, 3, 1, std::vector<double>(grid.size(), 1.0)},
+                                            lines};
+  const auto product = [&](double paths, double film) {
+    return (1 / paths + 0.01 / (film * film)) * (3 * paths + 3 * film);
+  };
+  double least = std::numeric_limits<double>::infinity();
+  for (int paths = 1; paths <= 64; ++paths) {
+    for (double film = 0.125; film <= 64; film *= 1.1)
+      least = std::min(least, product(paths, film));
+  }
+  SamplePlan plan;
+  spread_samples(figures, grid, plan);
+  EXPECT_LE(product(plan.counts[0][0], plan.uniform[1]), 1.1 * least);
+}
+
+// Of x_1 = path + e / 2 and x_2 = path + e' / 2^(1 + power / 2), of independent e, e' and paths of
+// one distribution.
+TEST(PairSums, TellPathsFromDraws) {
+  for (const double power : {1.0, 2.0}) {
+    PairSums sums(100, 1);
+    Rng rng(3, 4, 5);
+    const auto centered = [&] { return rng.uniform() - 0.5; };
+    for (int i = 0; i < 100000; ++i) {
+      const double path = centered(), one = centered() / 2;
+      const double two = centered() * std::exp2(-1 - power / 2);
+      const auto value = [](double x) { return grey(Lanes{x, 0, 0, 0}); };
+      sums.add(i % 100, value(3 + path + one), value(3 + path + two));
+    }
+    const auto [kept, found] = sums.shares(0);
+    EXPECT_NEAR(kept, 0.8, 0.02) << power;
+    EXPECT_NEAR(found, power, 0.2) << power;
+  }
+}
+
 TEST(SpreadSamples, AreEvenWhereNothingVaries) {
   PlanGrid grid;
   grid.columns = grid.rows = 10;

@@ -321,7 +321,8 @@ TEST(MovingDirections, AreAlikeForSeveralParameters) {
     SampleSink sink(scene.film, count, estimator.lane_scale(), sums, costs, bad, nullptr);
     std::vector<TurnedSample> samples;
     for (int i = 0; i < kSamples; ++i) {
-      const auto sample = estimator.sample({i % 16, i / 16 % 16, i}, Rng(7, i, 0), true, sink);
+      const auto sample =
+          estimator.sample({i % 16, i / 16 % 16, i}, Rng(7, i, 0), true, false, sink);
       EXPECT_TRUE(sample.finite);
       samples.insert(samples.end(), sample.terms.begin(), sample.terms.end());
     }
