@@ -42,33 +42,44 @@ Rng pixel_key(const SampleEstimator& estimator, const Batch& batch, const PixelS
   const Camera& camera = estimator.scene().camera;
   uint64_t pixel = static_cast<uint64_t>(at.y) * camera.width + at.x;
   if (at.x < 0 || at.y < 0 || at.x >= camera.width || at.y >= camera.height) {
-    // Around the film, see sampled_film: numbers that no pixel has.
+    // Around the film, see sampled_tiles: numbers that no pixel has.
     constexpr int kMost = SharedPlace::kMostReach;
     const uint64_t row = at.y + kMost;
     pixel = UINT64_MAX - 1 - (row * (camera.width + 2 * kMost) + at.x + kMost);
   }
   return key_of(estimator, batch, pixel, at.s);
 }
-// Null where samples serve their own pixels alone.
-const SharingEstimator* sharing_of(const SampleEstimator& estimator) {
-  const auto* sharing = dynamic_cast<const SharingEstimator*>(&estimator);
-  return sharing && sharing->reach() > 0 ? sharing : nullptr;
-}
-SharedPlace shared_place(const SharingEstimator& estimator, const Batch& batch, int64_t s) {
-  return {estimator.scene().film.filter, estimator.reach(),
-          key_of(estimator, batch, UINT64_MAX, s)};
+// Appends those of a sample.
+void add_places(const SampleEstimator& estimator, const Batch& batch, int64_t s,
+                std::vector<SharedPlace>& places) {
+  const Rng key = key_of(estimator, batch, UINT64_MAX, s);
+  for (int i = 0; i < estimator.places(); ++i) {
+    places.emplace_back(estimator.scene().film.filter, estimator.reach(), key.path(i));
+  }
 }
 
-// The pixels that have samples: with sample_border, all around the film that serve pixels of it.
-Film sampled_film(const SampleEstimator& estimator) {
-  Film film = estimator.scene().film;
-  const SharingEstimator* sharing = sharing_of(estimator);
-  if (!sharing || !film.sample_border) return film;
-  film.crop_x -= sharing->reach();
-  film.crop_y -= sharing->reach();
-  film.crop_width += 2 * sharing->reach();
-  film.crop_height += 2 * sharing->reach();
-  return film;
+// The film in tiles, then, with sample_border, pixels around it that have samples for it.
+std::vector<Tile> sampled_tiles(const SampleEstimator& estimator) {
+  const Film& film = estimator.scene().film;
+  std::vector<Tile> tiles = make_tiles(film);
+  const int reach = estimator.reach();
+  if (reach == 0 || !film.sample_border) return tiles;
+  const auto add = [&](int x, int y, int width, int height) {
+    Film part = film;
+    part.crop_x = x;
+    part.crop_y = y;
+    part.crop_width = width;
+    part.crop_height = height;
+    const std::vector<Tile> more = make_tiles(part);
+    tiles.insert(tiles.end(), more.begin(), more.end());
+  };
+  const int right = film.crop_x + film.crop_width, bottom = film.crop_y + film.crop_height;
+  const int width = film.crop_width + 2 * reach;
+  add(film.crop_x - reach, film.crop_y - reach, width, reach);
+  add(film.crop_x - reach, film.crop_y, reach, film.crop_height);
+  add(right, film.crop_y, reach, film.crop_height);
+  add(film.crop_x - reach, bottom, width, reach);
+  return tiles;
 }
 
 // The part of the film that samples of a tile add to.
@@ -87,8 +98,9 @@ class BatchRunner {
   BatchRunner(const SampleEstimator& estimator, const Batch& batch, int threads,
               ProgressCounter& progress)
       : estimator_(estimator),
-        sharing_(sharing_of(estimator)),
+        reach_(estimator.reach()),
         film_(estimator.scene().film),
+        served_(served_pixels(film_)),
         batch_(batch),
         threads_(threads),
         progress_(progress),
@@ -97,8 +109,8 @@ class BatchRunner {
     sums_.images.resize(estimator.slots() * estimator.lanes());
     for (auto& image : sums_.images) image.assign(film_size(film_), 0.0);
     sums_.costs.resize(estimator.slots());
-    for (int s = batch.first; sharing_ && s < batch.last; ++s) {
-      places_.push_back(shared_place(*sharing_, batch, s));
+    for (int s = batch.first; reach_ > 0 && s < batch.last; ++s) {
+      add_places(estimator_, batch, s, places_);
     }
   }
 
@@ -113,27 +125,36 @@ class BatchRunner {
 
  private:
   void run_pixels() {
-    const std::vector<Tile> tiles = make_tiles(sampled_film(estimator_));
+    const std::vector<Tile> tiles = sampled_tiles(estimator_);
     std::vector<std::vector<TermCost>> costs(tiles.size());
     std::vector<NonFinite> bad(tiles.size());
-    std::vector<BatchSums> parts(sharing_ ? tiles.size() : 0);  // they overlap
-    parallel_for(tiles.size(), threads_, [&](size_t i) {
+    // Tiles of shared samples overlap: so many at most have sums of their own in memory. Not tuned.
+    const bool overlap = reach_ > 0;
+    const size_t group = overlap ? 512 : tiles.size();
+    for (size_t begin = 0; begin < tiles.size(); begin += group) {
+      const size_t end = std::min(begin + group, tiles.size());
+      std::vector<BatchSums> parts(overlap ? end - begin : 0);
+      parallel_for(end - begin, threads_, [&](size_t n) {
+        if (progress_.stopped()) return;
+        const size_t i = begin + n;
+        costs[i].resize(estimator_.slots());
+        const Film film = overlap ? reach_of(film_, tiles[i], reach_) : film_;
+        if (overlap) {
+          parts[n].radiance.assign(film_size(film), 0.0);
+          parts[n].images.resize(sums_.images.size());
+        }
+        SampleSink sink(film, served_, estimator_.lanes(), lane_scale_, overlap ? parts[n] : sums_,
+                        costs[i], bad[i], nullptr);
+        run_tile(tiles[i], costs[i], sink);
+        progress_.step(batch_.count());
+      });
       if (progress_.stopped()) return;
-      costs[i].resize(estimator_.slots());
-      if (parts.empty()) {
-        SampleSink sink(film_, estimator_.lanes(), lane_scale_, sums_, costs[i], bad[i], nullptr);
-        run_tile(tiles[i], costs[i], sink);
-      } else {
-        const Film part = reach_of(film_, tiles[i], sharing_->reach());
-        parts[i].radiance.assign(film_size(part), 0.0);
-        SampleSink sink(part, estimator_.lanes(), lane_scale_, parts[i], costs[i], bad[i], nullptr);
-        run_tile(tiles[i], costs[i], sink);
-      }
-      progress_.step(batch_.count());
-    });
-    if (progress_.stopped()) return;
-    for (size_t i = 0; i < parts.size(); ++i) {
-      add_part(reach_of(film_, tiles[i], sharing_->reach()), parts[i].radiance);
+      for (size_t n = 0; n < parts.size(); ++n) add_part(tiles[begin + n], parts[n]);
+    }
+    // Samples are traced by pixels of the film: those around it are not named.
+    for (size_t i = 0; i < tiles.size(); ++i) {
+      if (is_on_film(tiles[i].x0, tiles[i].y0)) continue;
+      for (TermCost& cost : costs[i]) cost.largest = {};
     }
     for (size_t i = 0; i < tiles.size(); ++i) {
       for (size_t slot = 0; slot < costs[i].size(); ++slot) sums_.costs[slot].merge(costs[i][slot]);
@@ -141,11 +162,19 @@ class BatchRunner {
     }
   }
 
-  void add_part(const Film& part, const std::vector<double>& radiance) {
+  void add_part(const Tile& tile, const BatchSums& sums) {
+    const Film part = reach_of(film_, tile, reach_);
+    add_part(part, sums.radiance, sums_.radiance);
+    for (size_t i = 0; i < sums.images.size(); ++i) {
+      if (!sums.images[i].empty()) add_part(part, sums.images[i], sums_.images[i]);
+    }
+  }
+  void add_part(const Film& part, const std::vector<double>& image,
+                std::vector<double>& sum) const {
     const size_t row = size_t{3} * part.crop_width;
     for (int y = 0; y < part.crop_height; ++y) {
-      const double* from = &radiance[y * row];
-      double* to = &sums_.radiance[pixel_index(film_, part.crop_x, part.crop_y + y)];
+      const double* from = &image[y * row];
+      double* to = &sum[pixel_index(film_, part.crop_x, part.crop_y + y)];
       for (size_t i = 0; i < row; ++i) to[i] += from[i];
     }
   }
@@ -153,16 +182,18 @@ class BatchRunner {
   void run_tile(const Tile& tile, std::vector<TermCost>& costs, SampleSink& sink) {
     const Stopwatch watch;
     const auto is_any = [](int, int) { return true; };
-    const auto is_cut = [&](int x, int y) { return !is_whole(film_, x, y); };
+    const auto is_cut = [&](int x, int y) { return is_on_film(x, y) && !served_.holds(x, y); };
     const auto add = [&](const std::vector<KeyedSample>& together) {
       estimator_.add_pixels(together, sink);
     };
-    if (sharing_) {
+    if (reach_ > 0) {
       std::vector<const SharedPlace*> places;
       in_groups(tile, is_any, [&](const std::vector<KeyedSample>& together) {
         places.clear();
-        for (const KeyedSample& one : together) places.push_back(&places_[one.at.s - batch_.first]);
-        sharing_->add_shared(together, places, sink);
+        for (const KeyedSample& one : together) {
+          places.push_back(&places_[(one.at.s - batch_.first) * estimator_.places()]);
+        }
+        estimator_.add_shared(together, places, sink);
       });
       in_groups(tile, is_cut, add);
     } else {
@@ -254,10 +285,18 @@ class BatchRunner {
     chunk.cost.seconds = watch.seconds();
   }
 
-  // Adds a sample to the pixels whose filters reach it.
+  bool is_on_film(int x, int y) const {
+    return x >= film_.crop_x && y >= film_.crop_y && x < film_.crop_x + film_.crop_width &&
+           y < film_.crop_y + film_.crop_height;
+  }
+
+  // Adds a sample to the pixels whose filters reach it. Where samples are shared, directions turn
+  // as in the pixel that it lies in.
   void splat(size_t slot, const FilmSample& sample, double scale) {
+    const Rgb<Lanes> own = own_value(sample);
     for_every_pixel_of(film_, sample.x, sample.y, [&](int x, int y, double weight) {
-      add(slot, pixel_index(film_, x, y), value_for(x, y, sample), weight * scale);
+      const bool shared = reach_ > 0 && served_.holds(x, y);
+      add(slot, pixel_index(film_, x, y), shared ? own : value_for(x, y, sample), weight * scale);
     });
   }
 
@@ -286,8 +325,9 @@ class BatchRunner {
   }
 
   const SampleEstimator& estimator_;
-  const SharingEstimator* sharing_;
+  int reach_;  // of shared samples, else 0
   const Film& film_;
+  Tile served_;
   const Batch& batch_;
   int threads_;
   ProgressCounter& progress_;
@@ -377,7 +417,7 @@ size_t steps_per_sample(Estimators estimators) {
   size_t steps = 0;
   for (const auto& estimator : estimators) {
     steps += 1;
-    if (estimator->samples_pixels()) steps += make_tiles(sampled_film(*estimator)).size();
+    if (estimator->samples_pixels()) steps += sampled_tiles(*estimator).size();
   }
   return steps;
 }
@@ -530,14 +570,15 @@ void run_pixel_sample(const SampleEstimator& estimator, uint64_t seed, const Pix
   std::vector<TermCost> costs(estimator.slots());
   NonFinite bad;
   const Lanes lane_scale = estimator.lane_scale();
-  SampleSink sink(film, estimator.lanes(), lane_scale, sums, costs, bad, &log);
+  const Tile served = served_pixels(film);
+  SampleSink sink(film, served, estimator.lanes(), lane_scale, sums, costs, bad, &log);
   const Batch batch = batch_of(estimator, seed, INT_MAX, static_cast<int>(at.s));
   const KeyedSample one{at, pixel_key(estimator, batch, at)};
-  const SharingEstimator* sharing = sharing_of(estimator);
-  if (sharing && is_whole(film, at.x, at.y)) {
-    const SharedPlace place = shared_place(*sharing, batch, at.s);
-    const SharedPlace* const places[] = {&place};
-    sharing->add_shared({&one, 1}, places, sink);
+  if (estimator.reach() > 0 && served.holds(at.x, at.y)) {
+    std::vector<SharedPlace> places;
+    add_places(estimator, batch, at.s, places);
+    const SharedPlace* const first = places.data();
+    estimator.add_shared({&one, 1}, {&first, 1}, sink);
   } else {
     estimator.add_pixels({&one, 1}, sink);
   }

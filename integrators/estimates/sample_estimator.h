@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "integrators/estimates/shared_place.h"
 #include "integrators/estimates/tiles.h"
 #include "limn/core/dual.h"
 #include "limn/core/film.h"
@@ -95,13 +96,15 @@ struct BatchSums {
   NonFinite non_finite;
 };
 
-// Where the samples of one tile go. Pixels of different tiles do not overlap, so that tiles share
-// the images; costs and what was not finite are a tile's own.
+// Where the samples of one tile go. Pixels of different tiles do not overlap unless samples are
+// shared, so that tiles share the images; costs and what was not finite are a tile's own.
 class SampleSink {
  public:
-  SampleSink(const Film& film, int lanes, const Lanes& lane_scale, BatchSums& images,
-             std::vector<TermCost>& costs, NonFinite& non_finite, SampleLog* log)
+  // film: of the images. served: the pixels that shared samples serve.
+  SampleSink(const Film& film, const Tile& served, int lanes, const Lanes& lane_scale,
+             BatchSums& images, std::vector<TermCost>& costs, NonFinite& non_finite, SampleLog* log)
       : film_(film),
+        served_(served),
         lanes_(lanes),
         lane_scale_(lane_scale),
         sums_(images),
@@ -109,22 +112,45 @@ class SampleSink {
         non_finite_(non_finite),
         log_(log) {}
 
-  void add_radiance(const PixelSample& at, const Rgb<double>& radiance, double weight) {
-    double* out = radiance_of(at);
-    for (int c = 0; c < 3; ++c) out[c] += radiance[c] * weight;
+  // place: where the sample lies in its pixel if all pixels that it reaches have a share of it;
+  // null: its own alone.
+  void add_radiance(const PixelSample& at, const Rgb<double>& radiance, double weight,
+                    const SharedPlace* place = nullptr) {
+    share(at, weight, place, [&](size_t index, double share) {
+      for (int c = 0; c < 3; ++c) sums_.radiance[index + c] += radiance[c] * share;
+    });
   }
   // Three sums; they stay where they are until the batch ends.
-  double* radiance_of(const PixelSample& at) {
-    return &sums_.radiance[pixel_index(film_, at.x, at.y)];
-  }
-  void add(size_t slot, const PixelSample& at, const Rgb<Lanes>& value, double weight) {
-    const size_t index = pixel_index(film_, at.x, at.y);
+  double* radiance_of(const PixelSample& at) { return radiance_at(pixel_index(film_, at.x, at.y)); }
+  double* radiance_at(size_t index) { return &sums_.radiance[index]; }
+  void add(size_t slot, const PixelSample& at, const Rgb<Lanes>& value, double weight,
+           const SharedPlace* place = nullptr) {
+    std::vector<double>* const images = &sums_.images[slot * lanes_];
     for (int k = 0; k < lanes_; ++k) {
-      double* out = &sums_.images[slot * lanes_ + k][index];
-      for (int c = 0; c < 3; ++c) out[c] += value[c][k] * weight;
+      if (images[k].empty()) images[k].assign(film_size(film_), 0.0);
     }
-    costs_[slot].largest.add(squared_magnitude(value, weight, lanes_, lane_scale_),
+    share(at, weight, place, [&](size_t index, double share) {
+      for (int k = 0; k < lanes_; ++k) {
+        for (int c = 0; c < 3; ++c) images[k][index + c] += value[c][k] * share;
+      }
+    });
+    const double squares = place ? place->squares : 1;
+    costs_[slot].largest.add(squares * squared_magnitude(value, weight, lanes_, lane_scale_),
                              {at.x, at.y, at.s, ""});
+  }
+  // Calls add(pixel_index, k) for pixels that samples reach that lie in a pixel and are shared: k
+  // counts the weights of SharedPlace.
+  template <class Add>
+  void serve(const PixelSample& at, int reach, const Add& add) const {
+    const bool all =
+        served_.holds(at.x - reach, at.y - reach) && served_.holds(at.x + reach, at.y + reach);
+    size_t k = 0;
+    for (int row = -reach; row <= reach; ++row) {
+      for (int column = -reach; column <= reach; ++column, ++k) {
+        const int x = at.x - column, y = at.y - row;
+        if (all || served_.holds(x, y)) add(pixel_index(film_, x, y), k);
+      }
+    }
   }
   // A sample that is not finite: it counts as zero and is reported.
   void reject(const PixelSample& at, const std::string& name) {
@@ -144,7 +170,16 @@ class SampleSink {
   }
 
  private:
+  // Calls add(pixel_index, weight) for all pixels that the sample adds to.
+  template <class Add>
+  void share(const PixelSample& at, double weight, const SharedPlace* place, const Add& add) const {
+    if (!place) return add(pixel_index(film_, at.x, at.y), weight);
+    serve(at, place->reach,
+          [&](size_t index, size_t k) { add(index, place->weights[k] * weight); });
+  }
+
   const Film& film_;
+  Tile served_;
   int lanes_;
   const Lanes& lane_scale_;
   BatchSums& sums_;
@@ -159,6 +194,10 @@ enum class Numbers {
   kEvenInBatches,  // Rng::even of a batch alone: batches are independent
   kEvenInRun       // of all: what batches differ by is no error then, nor a bound of it
 };
+// SharedPlace::reach_of; 0 where numbers, and so pixels, are independent.
+inline int shared_reach(const Film& film, Numbers numbers) {
+  return numbers == Numbers::kIndependent ? 0 : SharedPlace::reach_of(film);
+}
 
 // Thread-safe: all of it is const.
 class SampleEstimator {
@@ -180,6 +219,14 @@ class SampleEstimator {
   virtual size_t pixel_slot() const { return 0; }
   virtual size_t together() const { return kMostTogether; }
   virtual void add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const = 0;
+  // Where samples of pixels are shared: SharedPlace::reach_of() the film, how many places a sample
+  // has, and the same for samples that lie in their pixels at these, from places[i] on, each for
+  // all pixels that it serves. 0: none is.
+  virtual int reach() const { return 0; }
+  virtual int places() const { return 1; }
+  virtual void add_shared(std::span<const KeyedSample> /*samples*/,
+                          std::span<const SharedPlace* const> /*places*/,
+                          SampleSink& /*sink*/) const {}
 
   // Samples of a slot that belong to the film as a whole: how many per pixel (0: none), and one of
   // them: `u` in [0, 1) is stratified over a batch, `key` is for everything else. False if it adds

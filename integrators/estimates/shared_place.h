@@ -6,12 +6,14 @@
 // draws m. Here d alone is drawn, and all m are taken with these weights. So an image has the same
 // expectation, and less variance, as nothing is left of the choice of m. The weights add up to 1:
 // a constant has no error. Pixels whose filters the film's border cuts have samples of their own;
-// with sample_border there are none, and pixels around the film have samples that serve it.
+// with sample_border there are none, and pixels around the film have samples that serve it. Errors
+// of neighbours depend on each other; each pixel's variance, and those of sums of pixels that are
+// taken batch by batch, are right.
 #include <array>
-#include <span>
 
-#include "integrators/estimates/sample_estimator.h"
+#include "integrators/estimates/tiles.h"
 #include "limn/core/film.h"
+#include "limn/core/rng.h"
 
 namespace limn {
 
@@ -20,30 +22,25 @@ struct SharedPlace {
   static constexpr int kMostSide = 2 * kMostReach + 1;
 
   // How many pixels from its own a sample may serve on every side: 0 if it serves its own alone, as
-  // with box filters.
+  // with box filters, and on films most of whose pixels have samples of their own.
   static int reach_of(const Film& film);
 
-  // key: of this sample of all pixels.
-  SharedPlace(const Filter& filter, int reach, const Rng& key);
+  // Mean of `squares`: what of a sample's variance is left in a pixel, where it is alike in all.
+  static double mean_squares(const Filter& filter, int reach);
 
+  // key: of this sample of all pixels. served: reach_of().
+  SharedPlace(const Filter& filter, int served, const Rng& key);
+
+  int reach;
   double x, y;  // in the pixel, [0, 1]
   // Rows of 2 reach + 1: of the pixel `reach` below and to the right first, up to that above and to
   // the left.
   std::array<double, size_t{kMostSide} * kMostSide> weights;
+  double squares;  // sum of the weights' squares
 };
 
-// Whether the whole filter around pixel (x, y) lies on the film.
-bool is_whole(const Film& film, int x, int y);
-
-// Estimators of images by such samples.
-class SharingEstimator : public SampleEstimator {
- public:
-  // See SharedPlace::reach_of; 0: its samples are those of any estimator.
-  virtual int reach() const = 0;
-  // As SampleEstimator::add_pixels, but sample i adds radiance to all that it serves of the film:
-  // pixels whose filters are whole.
-  virtual void add_shared(std::span<const KeyedSample> samples,
-                          std::span<const SharedPlace* const> places, SampleSink& sink) const = 0;
-};
+// The pixels that shared samples serve: those whose whole filters lie on the sampled part of the
+// film.
+Tile served_pixels(const Film& film);
 
 }  // namespace limn

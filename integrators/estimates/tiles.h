@@ -14,6 +14,8 @@ inline constexpr int kTileSize = 16;  // not tuned
 
 struct Tile {
   int x0, y0, x1, y1;  // full-film pixels, [x0, x1) by [y0, y1)
+
+  bool holds(int x, int y) const { return x >= x0 && y >= y0 && x < x1 && y < y1; }
 };
 
 // Rows of tiles of the crop window, in a fixed order.

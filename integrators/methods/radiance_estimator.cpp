@@ -16,7 +16,7 @@ RadianceEstimator::RadianceEstimator(const Scene& scene, int threads, bool close
       filter_(scene_.film.filter),
       numbers_(numbers),
       glossy_(is_glossy(scene_)),
-      reach_(numbers == Numbers::kEvenInRun && !closed ? SharedPlace::reach_of(scene_.film) : 0) {}
+      reach_(closed ? 0 : shared_reach(scene_.film, numbers)) {}
 
 RadianceEstimator::RadianceEstimator(const Scene& moved, PathChoices& choices, int threads,
                                      Numbers numbers)
@@ -25,7 +25,8 @@ RadianceEstimator::RadianceEstimator(const Scene& moved, PathChoices& choices, i
       camera_(scene_.camera),
       filter_(scene_.film.filter),
       numbers_(numbers),
-      glossy_(is_glossy(scene_)) {}
+      glossy_(is_glossy(scene_)),
+      reach_(shared_reach(scene_.film, numbers)) {}
 
 void RadianceEstimator::add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const {
   // In closed form what is left to chance is where in its pixel a sample lies: it takes two places.
@@ -100,11 +101,7 @@ void RadianceEstimator::add(const std::vector<Walk>& walks, std::span<const Keye
 void RadianceEstimator::add_shared(std::span<const KeyedSample> samples,
                                    std::span<const SharedPlace* const> places,
                                    SampleSink& sink) const {
-  std::array<FilmPosition, kMostTogether> on_film;
-  for (size_t i = 0; i < samples.size(); ++i) {
-    on_film[i] = {samples[i].at.x + places[i]->x, samples[i].at.y + places[i]->y};
-  }
-  const FilmRays rays(scene_, camera_, samples, {on_film.data(), samples.size()});
+  const FilmRays rays(scene_, camera_, samples, places);
   const auto add = [&](const auto& walks) {
     const size_t side = 2 * reach_ + 1;
     Footprint sums;
@@ -137,24 +134,10 @@ void RadianceEstimator::add_shared(std::span<const KeyedSample> samples,
 // The sums are zero afterwards.
 void RadianceEstimator::add_footprint(const PixelSample& at, Footprint& sums,
                                       SampleSink& sink) const {
-  const Film& film = scene_.film;
-  const auto served = [&](int x, int y) {
-    return x >= film.crop_x && y >= film.crop_y && x < film.crop_x + film.crop_width &&
-           y < film.crop_y + film.crop_height && is_whole(film, x, y);
-  };
-  // These are a rectangle of the film.
-  const bool all = served(at.x - reach_, at.y - reach_) && served(at.x + reach_, at.y + reach_);
-  size_t k = 0;
-  for (int row = -reach_; row <= reach_; ++row) {
-    const int y = at.y - row;
-    for (int column = -reach_; column <= reach_; ++column, ++k) {
-      const int x = at.x - column;
-      if (all || served(x, y)) {
-        sink.add_radiance({x, y, at.s}, {sums[0][k], sums[1][k], sums[2][k]}, 1);
-      }
-      for (auto& sum : sums) sum[k] = 0;
-    }
-  }
+  sink.serve(at, reach_, [&](size_t index, size_t k) {
+    for (int c = 0; c < 3; ++c) sink.radiance_at(index)[c] += sums[c][k];
+  });
+  for (auto& sum : sums) std::fill(sum.begin(), sum.end(), 0.0);
 }
 
 }  // namespace limn

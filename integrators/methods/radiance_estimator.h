@@ -4,14 +4,14 @@
 #include <span>
 #include <vector>
 
-#include "integrators/estimates/shared_place.h"
+#include "integrators/estimates/sample_estimator.h"
 #include "integrators/paths/film_rays.h"
 #include "integrators/paths/path.h"
 #include "integrators/paths/traced_scene.h"
 
 namespace limn {
 
-class RadianceEstimator final : public SharingEstimator {
+class RadianceEstimator final : public SampleEstimator {
  public:
   // The scene must outlive the estimator. closed: what surfaces scatter is known in closed form,
   // InputError if it is not.
@@ -48,9 +48,7 @@ class RadianceEstimator final : public SharingEstimator {
   FilterTable filter_;
   Numbers numbers_;
   bool glossy_;
-  // Errors of neighbours depend on each other where samples are shared, which no variance shows:
-  // so it is where these are no errors anyway.
-  int reach_ = 0;
+  int reach_;
 };
 
 }  // namespace limn

@@ -419,10 +419,11 @@ class TermJob {
     const double not_turned = probed.error_times_work(lanes, false);
     if (!(held > kTurnsAlone * not_turned)) return;
     const double pixels = static_cast<double>(film_size(scene_.film)) / 3;
-    const FilmLook look{film_pilot_samples(settings.spp),
-                        kFilmShare * settings.spp * probed.pilot.work_of_pixel() * pixels,
-                        std::min(kFilmPromising, kFilmAgainstTurns * held / not_turned),
-                        size.pixels};
+    const FilmLook look{
+        film_pilot_samples(settings.spp),
+        kFilmShare * settings.spp * probed.pilot.work_of_pixel() * pixels,
+        probed.shared * std::min(kFilmPromising, kFilmAgainstTurns * held / not_turned),
+        size.pixels};
     FilmFit film = fit_film_of(p, plan, look, budget);
     if (!film.motion.empty()) {
       SamplePlan moving = plan;
@@ -525,7 +526,7 @@ class TermJob {
   // By what a pilot found. most: work of a sample of one pixel.
   void share_out(const TermEstimator& estimator, const Probed& probed, double most,
                  SamplePlan& plan) const {
-    const auto& [pilot, fit] = probed;
+    const auto& [pilot, fit, shared] = probed;
     std::vector<double> units;
     const std::vector<TermFigures> figures = figures_of(estimator, probed, units);
     double price;
@@ -535,6 +536,7 @@ class TermJob {
       plan.uniform = best_samples(figures, most);
       price = price_of(figures, plan.uniform);
     }
+    for (double& unit : units) unit /= shared;  // of single samples
     if (method_.spreads_samples || method_.random_directions)
       plan.survival = survival_of(pilot.traced, price, units);
     plan.grid = pilot.grid;

@@ -22,12 +22,15 @@ class FilmRays {
     place(scene, filter, samples, mirrored);
     start(scene, camera, samples);
   }
-  // Through given places, one for each sample.
+
+  // Through places in the samples' pixels.
   FilmRays(const Scene& scene, const CameraView<double>& camera,
-           std::span<const KeyedSample> samples, std::span<const FilmPosition> places)
+           std::span<const KeyedSample> samples, std::span<const SharedPlace* const> places)
       : count_(samples.size()) {
     DCHECK_LE(count_, kMostTogether);
-    std::copy(places.begin(), places.end(), places_.begin());
+    for (size_t i = 0; i < count_; ++i) {
+      places_[i] = {samples[i].at.x + places[i]->x, samples[i].at.y + places[i]->y};
+    }
     start(scene, camera, samples);
   }
 

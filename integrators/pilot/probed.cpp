@@ -20,8 +20,8 @@ std::vector<double> Probed::variances(int lane, std::vector<std::vector<double>>
     if (!pilot.in_cells(slot)) continue;
     // Some terms have samples of both kinds.
     cells[slot] = fitted ? fit.variances[lane][slot] : pilot.variances(slot, lane);
-    means[slot] += trimmed_mean(cells[slot]);
-    for (double& cell : cells[slot]) cell += film;
+    means[slot] += shared * trimmed_mean(cells[slot]);
+    for (double& cell : cells[slot]) cell = shared * cell + film;
   }
   return means;
 }
@@ -48,6 +48,8 @@ double Probed::error_times_work(int parameters, bool turned) const {
 Probed probe(const TermEstimator& estimator, bool turns, const PilotSize& size,
              const RunSettings& settings, const Stopwatch& watch) {
   Probed probed{run_pilot(estimator, turns, {0, size.spp, size.pixels}, settings, watch), {}};
+  if (const int reach = estimator.reach(); reach > 0)
+    probed.shared = SharedPlace::mean_squares(estimator.scene().film.filter, reach);
   if (turns && probed.pilot.spp > 0)
     probed.fit = fit_fields(probed.pilot, estimator.lanes(), settings.threads);
   return probed;

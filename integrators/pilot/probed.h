@@ -10,7 +10,8 @@ namespace limn {
 
 struct Probed {
   PilotFigures pilot;
-  FieldFit fit;  // empty where turns are not looked at
+  FieldFit fit;       // empty where turns are not looked at
+  double shared = 1;  // of a pixel's variance by its own samples, what sharing them leaves
 
   // The variance of one sample of every slot, of a parameter: the mean over the film, and in cells
   // where it has them.

@@ -1,5 +1,6 @@
 #pragma once
 // What a sample of each pixel holds: how many samples of every term, and how its directions move.
+#include <algorithm>
 #include <array>
 #include <vector>
 
@@ -21,8 +22,10 @@ struct PlanGrid {
   PlanGrid(const Film& film, size_t most);
 
   size_t size() const { return static_cast<size_t>(columns) * rows; }
+  // Of a pixel around the film: that of the nearest.
   size_t index(int x, int y) const {
-    return static_cast<size_t>((y - y0) / cell) * columns + (x - x0) / cell;
+    const int column = std::clamp((x - x0) / cell, 0, columns - 1);
+    return static_cast<size_t>(std::clamp((y - y0) / cell, 0, rows - 1)) * columns + column;
   }
   // The one pixel of its cell that a pilot looks at.
   bool is_probe(const Film& film, int x, int y) const;

@@ -93,6 +93,11 @@ TermEstimator::TermEstimator(const Scene& scene, std::span<const Parameter> para
 void TermEstimator::set_plan(SamplePlan plan) {
   const bool moved = !plan_.film.empty();
   plan_ = std::move(plan);
+  reach_ = traced_.context().closed ? 0 : shared_reach(scene_.film, plan_.numbers);
+  most_paths_ = std::max(1, static_cast<int>(plan_.uniform[pixel_slot_]));
+  for (const PixelCounts& counts : plan_.counts) {
+    most_paths_ = std::max(most_paths_, static_cast<int>(counts[pixel_slot_]));
+  }
   if (!moves_film_ || (plan_.film.empty() && !moved)) return;
   FilmMotionAt motion;
   if (!plan_.film.empty()) motion = [this](int x, int y) { return film_motion(x, y); };
@@ -131,10 +136,10 @@ class TermEstimator::PathBatch {
     const PathCosts costs = estimator_.trace<VertexTerms>(places_, walks_, nullptr, false);
     add_cost(costs, walks_.size(), sink_.cost(estimator_.pixel_slot_));
     for (size_t i = 0; i < walks_.size(); ++i) {
-      const PixelSample& at = places_[i].at;
-      estimator_.add_path(at, estimator_.path_of(walks_[i].sums, walks_[i].failed), weights_[i],
+      const PathStart& start = places_[i];
+      estimator_.add_path(start, estimator_.path_of(walks_[i].sums, walks_[i].failed), weights_[i],
                           sink_);
-      if (walks_[i].visitor) estimator_.add_vertices(at, *walks_[i].visitor, sink_);
+      if (walks_[i].visitor) estimator_.add_vertices(start, *walks_[i].visitor, sink_);
     }
     walks_.clear();
     vertices_.clear();
@@ -153,24 +158,32 @@ class TermEstimator::PathBatch {
   std::vector<double> weights_;
 };
 
-void TermEstimator::add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const {
+void TermEstimator::add_samples(std::span<const KeyedSample> samples,
+                                std::span<const SharedPlace* const> places,
+                                SampleSink& sink) const {
+  const auto shared = [&](size_t s, int i) {
+    return places.empty() ? nullptr : places[s] + i;  // of the i-th path
+  };
   if (sink.log()) {
-    for (const auto& [at, key] : samples) add_logged(at, key, sink);
+    for (size_t s = 0; s < samples.size(); ++s) {
+      add_logged(samples[s].at, samples[s].key, shared(s, 0), sink);
+    }
     return;
   }
-  if (values_) return add_values(samples, sink);
+  if (values_) return add_values(samples, places, sink);
   PathBatch batch(*this, sink);
-  for (const auto& [at, key] : samples) {
+  for (size_t s = 0; s < samples.size(); ++s) {
+    const auto& [at, key] = samples[s];
     const PixelCounts counts = plan_.counts_at(at);
     const int paths = paths_ ? static_cast<int>(counts[pixel_slot_]) : 1;
     const int all = paths * places_of_path();
     for (int i = 0; i < all; ++i) {
-      batch.add({at, i >= paths}, key.path(i % paths), 1.0 / all,
+      batch.add({at, i >= paths, shared(s, i)}, key.path(i % paths), 1.0 / all,
                 i == 0 && vertices_ ? &counts : nullptr);
     }
   }
   batch.finish();
-  add_moved_pixels(samples, sink);
+  if (places.empty()) add_moved_pixels(samples, sink);
 }
 
 // Of terms that move with positions on the film by themselves.
@@ -211,37 +224,39 @@ void TermEstimator::add_moved_pixels(std::span<const KeyedSample> samples, Sampl
 }
 
 // The same, path by path.
-void TermEstimator::add_logged(const PixelSample& at, const Rng& key, SampleSink& sink) const {
+void TermEstimator::add_logged(const PixelSample& at, const Rng& key, const SharedPlace* shared,
+                               SampleSink& sink) const {
   const PixelCounts counts = plan_.counts_at(at);
   const int paths = paths_ ? static_cast<int>(counts[pixel_slot_]) : 1;
   const int all = paths * places_of_path();
   const auto add = [&](auto& visitor, int i) {
-    const Path path = trace_one({at, i >= paths}, key.path(i % paths), plan_.field_at(at), visitor,
-                                sink.log(), sink.cost(pixel_slot_));
-    add_path(at, path, 1.0 / all, sink);
+    const PathStart start{at, i >= paths, shared ? shared + i : nullptr};
+    const Path path = trace_one(start, key.path(i % paths), plan_.field_at(at), visitor, sink.log(),
+                                sink.cost(pixel_slot_));
+    add_path(start, path, 1.0 / all, sink);
   };
   for (int i = 0; i < all; ++i) {
     if (i == 0) {
       VertexTerms vertices(*this, counts, nullptr, nullptr, sink);
       add(vertices, i);
-      add_vertices(at, vertices, sink);
+      add_vertices({at, false, shared}, vertices, sink);
     } else {
       PathLog log(*sink.log());
       add(log, i);
     }
   }
   const KeyedSample sample{at, key};
-  add_moved_pixels({&sample, 1}, sink);
+  if (!shared) add_moved_pixels({&sample, 1}, sink);
 }
 
-void TermEstimator::add_vertices(const PixelSample& at, const VertexTerms& vertices,
+void TermEstimator::add_vertices(const PathStart& start, const VertexTerms& vertices,
                                  SampleSink& sink) const {
   for (size_t slot = 0; slot < terms_.size(); ++slot) {
     if (!terms_[slot] || !terms_[slot]->uses_vertices()) continue;
     if (is_finite(vertices.sum(slot))) {
-      sink.add(slot, at, vertices.sum(slot), 1.0 / vertices.counts()[slot]);
+      sink.add(slot, start.at, vertices.sum(slot), 1.0 / vertices.counts()[slot], start.shared);
     } else {
-      sink.reject(at, slot_name(slot));
+      sink.reject(start.at, slot_name(slot));
     }
   }
 }
@@ -260,7 +275,10 @@ TermEstimator::PathCosts TermEstimator::trace(std::span<const PathStart> places,
   sample_lenses(scene_.camera, walks, lenses);
   for (size_t i = 0; i < walks.size(); ++i) {
     const PixelSample& at = places[i].at;
-    FilmPosition film = sample_pixel_filter(scene_.film, filter_, at.x, at.y, walks[i].key);
+    const SharedPlace* shared = places[i].shared;
+    FilmPosition film = shared
+                            ? FilmPosition{at.x + shared->x, at.y + shared->y}
+                            : sample_pixel_filter(scene_.film, filter_, at.x, at.y, walks[i].key);
     if (places[i].mirrored) film = mirrored_in_pixel(scene_.film, at.x, at.y, film);
     const auto ray = [&] {
       const FilmMotion* motion = plan_.film_motion(at.x, at.y);
@@ -317,16 +335,18 @@ void TermEstimator::add_cost(const PathCosts& costs, size_t paths, TermCost& cos
 }
 
 // Radiance, and what the terms make of it.
-void TermEstimator::add_path(const PixelSample& at, const Path& path, double weight,
+void TermEstimator::add_path(const PathStart& start, const Path& path, double weight,
                              SampleSink& sink) const {
+  const PixelSample& at = start.at;
   if (!path.finite) {
     sink.reject(at, slot_name(pixel_slot_));
     return;
   }
-  sink.add_radiance(at, value(path.found.radiance), weight);
+  sink.add_radiance(at, value(path.found.radiance), weight, start.shared);
   for (size_t slot = 0; slot < terms_.size(); ++slot) {
     if (terms_[slot] && terms_[slot]->uses_paths()) {
-      sink.add(slot, at, terms_[slot]->add_path(path.found.radiance) + path.found.score, weight);
+      sink.add(slot, at, terms_[slot]->add_path(path.found.radiance) + path.found.score, weight,
+               start.shared);
     }
   }
 }

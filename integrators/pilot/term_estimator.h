@@ -93,7 +93,16 @@ class TermEstimator final : public SampleEstimator {
   Numbers numbers() const override { return plan_.numbers; }
   bool samples_pixels() const override { return paths_ || vertices_; }
   size_t pixel_slot() const override { return pixel_slot_; }
-  void add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const override;
+  void add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const override {
+    add_samples(samples, {}, sink);
+  }
+  // Positions that move do so for each pixel by itself.
+  int reach() const override { return plan_.film.empty() ? reach_ : 0; }
+  int places() const override { return most_paths_; }
+  void add_shared(std::span<const KeyedSample> samples, std::span<const SharedPlace* const> places,
+                  SampleSink& sink) const override {
+    add_samples(samples, places, sink);
+  }
 
   double film_samples(size_t slot) const override {
     return terms_[slot] && terms_[slot]->uses_film() ? plan_.uniform[slot] : 0;
@@ -119,11 +128,15 @@ class TermEstimator final : public SampleEstimator {
     RayCount rays;
     WarpCount warped;
   };
-  // Where a path starts; mirrored: see mirrored_in_pixel.
+  // Where a path starts; mirrored: see mirrored_in_pixel. shared: null if it is its pixel's alone.
   struct PathStart {
     PixelSample at;
     bool mirrored = false;
+    const SharedPlace* shared = nullptr;
   };
+  // places: of shared samples, else empty.
+  void add_samples(std::span<const KeyedSample> samples, std::span<const SharedPlace* const> places,
+                   SampleSink& sink) const;
   // walks[i] is a path of places[i]; at most as many as a PathTracer takes.
   template <class Visitor>
   PathCosts trace(std::span<const PathStart> places, std::span<Walk<Dual, Visitor>> walks,
@@ -132,11 +145,13 @@ class TermEstimator final : public SampleEstimator {
   Path trace_one(const PathStart& place, const Rng& key, const DirectionField* field,
                  Visitor& visitor, SampleLog* log, TermCost& cost, bool twice = false) const;
   Path path_of(const PathSums<Dual>& found, bool failed) const;
-  void add_values(std::span<const KeyedSample> samples, SampleSink& sink) const;
+  void add_values(std::span<const KeyedSample> samples, std::span<const SharedPlace* const> places,
+                  SampleSink& sink) const;
   void add_moved_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const;
   Rgb<Lanes> sample_moved_pixel(size_t slot, const PixelSample& at, const Rng& key,
                                 SampleSink& sink) const;
-  void add_logged(const PixelSample& at, const Rng& key, SampleSink& sink) const;
+  void add_logged(const PixelSample& at, const Rng& key, const SharedPlace* shared,
+                  SampleSink& sink) const;
   // How many places of its pixel a path takes: in closed form these alone are left to chance.
   int places_of_path() const { return traced_.context().closed ? 2 : 1; }
   // Paths that are traced twice must take the same samples, though their vertices move otherwise.
@@ -148,8 +163,8 @@ class TermEstimator final : public SampleEstimator {
   // Without what turns change in lanes 1 to 3.
   Rgb<Lanes> at_rest(const Rgb<Lanes>& turning, const Rgb<Lanes>& turned) const;
   static void add_cost(const PathCosts& costs, size_t paths, TermCost& cost);
-  void add_path(const PixelSample& at, const Path& path, double weight, SampleSink& sink) const;
-  void add_vertices(const PixelSample& at, const VertexTerms& vertices, SampleSink& sink) const;
+  void add_path(const PathStart& start, const Path& path, double weight, SampleSink& sink) const;
+  void add_vertices(const PathStart& start, const VertexTerms& vertices, SampleSink& sink) const;
 
   std::vector<bool> changed_;  // of each slot: whether it is sampled
   Scene scene_;                // with its parameters seeded
@@ -170,6 +185,8 @@ class TermEstimator final : public SampleEstimator {
   // What a pilot turns directions by: about the axes x, y and z in the lanes 1 to 3.
   DirectionField turning_;
   SamplePlan plan_;
+  int reach_ = 0;       // of shared samples where positions on the film are held
+  int most_paths_ = 1;  // of a sample
 };
 
 }  // namespace limn

@@ -18,12 +18,15 @@ ValuePaths::ValuePaths(const PathContext& context, std::span<const Parameter> pa
       filter_(context.scene.film.filter),
       glossy_(is_glossy(context.scene)) {}
 
-void ValuePaths::trace(std::span<const KeyedSample> samples, RayCount& rays,
+void ValuePaths::trace(std::span<const KeyedSample> samples,
+                       std::span<const SharedPlace* const> places, RayCount& rays,
                        std::span<Found> found) const {
   PathTracer<Dual, Unmoved> tracer(context_, rays);
   tracer.colour_by(colours_);
   tracer.work_wide(glossy_);
-  const FilmRays starts(context_.scene, camera_, filter_, samples, false);
+  const FilmRays starts = places.empty()
+                              ? FilmRays(context_.scene, camera_, filter_, samples, false)
+                              : FilmRays(context_.scene, camera_, samples, places);
   std::vector<Walk<Dual, Unmoved>> walks;
   walks.reserve(samples.size());
   for (const KeyedSample& sample : samples) walks.emplace_back(sample.key, 0, nullptr);
@@ -33,26 +36,32 @@ void ValuePaths::trace(std::span<const KeyedSample> samples, RayCount& rays,
   }
 }
 
-void TermEstimator::add_values(std::span<const KeyedSample> samples, SampleSink& sink) const {
+void TermEstimator::add_values(std::span<const KeyedSample> samples,
+                               std::span<const SharedPlace* const> places, SampleSink& sink) const {
   std::vector<KeyedSample> paths;
+  std::vector<const SharedPlace*> shared;  // of the paths, where samples are
   std::vector<double> weights;
   const auto finish = [&] {
     std::array<ValuePaths::Found, kMostTogether> found;
     PathCosts costs;
-    values_->trace(paths, costs.rays, found);
+    values_->trace(paths, shared, costs.rays, found);
     add_cost(costs, paths.size(), sink.cost(pixel_slot_));
     for (size_t i = 0; i < paths.size(); ++i) {
       PathSums<Dual> sums;
       sums.radiance = found[i].radiance;
-      add_path(paths[i].at, path_of(sums, found[i].failed), weights[i], sink);
+      add_path({paths[i].at, false, shared.empty() ? nullptr : shared[i]},
+               path_of(sums, found[i].failed), weights[i], sink);
     }
     paths.clear();
+    shared.clear();
     weights.clear();
   };
-  for (const auto& [at, key] : samples) {
+  for (size_t s = 0; s < samples.size(); ++s) {
+    const auto& [at, key] = samples[s];
     const int count = static_cast<int>(plan_.counts_at(at)[pixel_slot_]);
     for (int i = 0; i < count; ++i) {
       if (paths.size() == kMostTogether) finish();
+      if (!places.empty()) shared.push_back(places[s] + i);
       paths.push_back({at, key.path(i)});
       weights.push_back(1.0 / count);
     }

@@ -21,8 +21,10 @@ class ValuePaths {
     Rgb<Dual> radiance;
     bool failed;  // it needed a ray that cannot be traced
   };
-  // found[i]: by the path of samples[i]; at most kMostTogether.
-  void trace(std::span<const KeyedSample> samples, RayCount& rays, std::span<Found> found) const;
+  // found[i]: by the path of samples[i]; at most kMostTogether. places: where these lie in their
+  // pixels; empty: as each pixel's filter has it.
+  void trace(std::span<const KeyedSample> samples, std::span<const SharedPlace* const> places,
+             RayCount& rays, std::span<Found> found) const;
 
  private:
   const PathContext& context_;

@@ -42,8 +42,8 @@ struct ListCount {
   uint64_t lists = 0, cones = 0, pieces = 0;  // cones: of regions, over all lists
 };
 ListCount listed_by_thread();
-// In the unit of Term::work. Against what paths and drawn edges take it is .9 to 1.1 of the time in
-// four scenes of 1 to 6 lamps.
+// In the unit of Term::work: by a fit of times in three scenes of 1 to 6 lamps, against what paths
+// and drawn edges take.
 double list_work(const ListCount& count);
 
 class DirectEdges {

@@ -15,8 +15,9 @@ const std::vector<std::string> kObjectTags = {"bsdf",     "emitter", "film",   "
                                               "rfilter",  "sampler", "sensor", "shape",
                                               "spectrum", "texture"};
 
-// Of shapes and sensors. Read by name alone, for integrators that ignore it.
+// Read by name alone, for integrators that ignore it.
 constexpr char kMedium[] = "medium";
+const std::vector<std::string> kWithMedia = {"emitter", "sensor", "shape"};
 
 constexpr size_t kMaxAliases = 64;  // in a chain of aliases; not tuned
 
@@ -172,7 +173,8 @@ class Describer {
       object.children.push_back({nullptr, id.value, id.where, name_of(element)});
     } else if (is_property_tag(element.name) && !is_object(element)) {
       add_property(element, object);
-    } else if (element.name == kMedium || contains(kObjectTags, element.name)) {
+    } else if (contains(kObjectTags, element.name) ||
+               (element.name == kMedium && contains(kWithMedia, object.tag))) {
       object.children.push_back({describe_object(element), "", element.where, name_of(element)});
     } else {
       std::vector<std::string> known = kObjectTags;

@@ -318,7 +318,8 @@ TEST(MovingDirections, AreAlikeForSeveralParameters) {
     BatchSums sums;
     std::vector<TermCost> costs(estimator.slots());
     NonFinite bad;
-    SampleSink sink(scene.film, count, estimator.lane_scale(), sums, costs, bad, nullptr);
+    SampleSink sink(scene.film, served_pixels(scene.film), count, estimator.lane_scale(), sums,
+                    costs, bad, nullptr);
     std::vector<TurnedSample> samples;
     for (int i = 0; i < kSamples; ++i) {
       const auto sample =
