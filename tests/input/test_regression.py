@@ -94,7 +94,7 @@ class Regression(unittest.TestCase):
             os.rename(os.path.join(folder, "wrong.xml"), os.path.join(folder, "wrong_path.xml"))
             # Off by less than Mitsuba's test sees.
             self.write(folder, "outdated", 0.5, 0.502)
-            self.write(folder, "unread", 0.5, 0.5, '<medium type="homogeneous"/>')
+            self.write(folder, "unread", 0.5, 0.5, '<volume type="homogeneous"/>')
             done = regression(folder, "--at-least", "1")
             self.assertEqual(done.returncode, 0, done.stderr)
             lines = {line.split()[0]: line for line in done.stdout.splitlines()}
@@ -106,7 +106,7 @@ class Regression(unittest.TestCase):
             else:
                 self.assertTrue(lines["outdated.xml"].endswith("passes FAILS"), done.stdout)
                 self.assertIn("Mitsuba is not installed", done.stdout)
-            self.assertIn("unknown element <medium>", lines["unread.xml"])
+            self.assertIn("unknown element <volume>", lines["unread.xml"])
             self.assertRegex(done.stdout, "[12] pass both of 3 that open, of 4 with references")
             self.assertEqual(regression(folder, "--at-least", "3").returncode, 1)
 
