@@ -155,6 +155,7 @@ class BatchRunner {
     for (size_t i = 0; i < tiles.size(); ++i) {
       if (is_on_film(tiles[i].x0, tiles[i].y0)) continue;
       for (TermCost& cost : costs[i]) cost.largest = {};
+      bad[i].first.clear();
     }
     for (size_t i = 0; i < tiles.size(); ++i) {
       for (size_t slot = 0; slot < costs[i].size(); ++slot) sums_.costs[slot].merge(costs[i][slot]);

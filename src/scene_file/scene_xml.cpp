@@ -67,9 +67,8 @@ class SceneBuilder {
     add_exposure();
     if (const auto& media = description_.media; !media.empty()) {
       warnings_.push_back(format_warning(
-          media.front(), fmt::format("the media of shapes and sensors are ignored, as by Mitsuba's "
-                                     "path: {} from here on",
-                                     media.size())));
+          media.front(),
+          fmt::format("media are ignored, as by Mitsuba's path: {} from here on", media.size())));
     }
     if (&warnings_ != &unread_warnings_) warn_of_overlaps(scene_, warnings_);
     return std::move(scene_);

@@ -62,8 +62,7 @@ TEST(OtherScenes, PathIgnoresMedia) {
   EXPECT_EQ(read(fog + ball + other, &warnings).shapes.size(), 2u);
   ASSERT_EQ(warnings.size(), 1u);
   EXPECT_EQ(warnings[0],
-            "string:3:43: warning: the media of shapes and sensors are ignored, as by Mitsuba's "
-            "path: 2 from here on");
+            "string:3:43: warning: media are ignored, as by Mitsuba's path: 2 from here on");
   EXPECT_EQ(read(fog + "<integrator type=\"volpath\"/>").shapes.size(), 0u);  // of no shape
   EXPECT_NE(message_of("<integrator type=\"prbvolpath\"/>" + fog + ball).find("sees media"),
             std::string::npos);
@@ -331,6 +330,19 @@ TEST(OtherScenes, WarningsOfAKindAreListed) {
   EXPECT_NE(
       warnings[2].find("3.obj: warning: like that of 2.obj, 2 more: 3.obj (1, 2), 4.obj (1, 2)"),
       std::string::npos)
+      << warnings[2];
+}
+
+TEST(OtherScenes, WarningsThatDifferInNamesAreListed) {
+  std::vector<std::string> warnings;
+  read(
+      "<shape type=\"Cube\"/><shape type=\"Disk\"/><shape type=\"Sphere\"/><shape "
+      "type=\"Rectangle\"/>",
+      &warnings);
+  ASSERT_EQ(warnings.size(), 4u);  // the last: faces of disk and rectangle overlap
+  EXPECT_NE(warnings[2].find("2 more: string:2:48 (\"Sphere\", \"sphere\"), string:2:70 "
+                             "(\"Rectangle\", \"rectangle\")"),
+            std::string::npos)
       << warnings[2];
 }
 

@@ -393,7 +393,7 @@ TEST(SharedPlaces, MakeDerivativesWithLessError) {
         of_own += own[k].total.variance(i);
       }
       fmt::print("{}{}: {:.3f} of the variance\n", shared[k].name, border, variance / of_own);
-      EXPECT_LT(variance, 0.6 * of_own);
+      EXPECT_LT(variance, 0.4 * of_own);  // even numbers alone: 0.54 to 0.63
       EXPECT_GE(compare_moments(shared[k].total_blocks, own[k].total_blocks).p_largest, 1e-5);
       EXPECT_GE(compare_moments(shared[k].image_sum, own[k].image_sum).p_largest, 1e-5);
     }

@@ -53,7 +53,7 @@ struct RenderOptions {
   // variances of `radiance` are no error, nor a bound of it: mostly too large, at times too small.
   // Images of other seeds are independent. A sample serves all pixels whose filters reach it, where
   // the filter is no box and reaches 3.5 pixels at most: expectations are the same, errors of
-  // neighbours depend on each other. Methods that look around take no notice of it: all their
+  // pixels depend on each other. Methods that look around take no notice of it: all their
   // numbers are even, with the same variances.
   std::string generator = "independent";
   Blur blur = {};  // of methods that blur; 0: see resolved()
