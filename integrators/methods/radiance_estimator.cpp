@@ -9,9 +9,21 @@
 
 namespace limn {
 
+// The scene without normals that are interpolated in vain; none if it has no such normals.
+static std::optional<Scene> without_idle_normals(const Scene& scene) {
+  std::optional<Scene> changed;
+  for (size_t s = 0; s < scene.shapes.size(); ++s) {
+    if (!has_idle_normals(scene.shapes[s].mesh)) continue;
+    if (!changed) changed = scene;
+    changed->shapes[s].mesh.normal_source = NormalSource::kFace;
+  }
+  return changed;
+}
+
 RadianceEstimator::RadianceEstimator(const Scene& scene, int threads, bool closed, Numbers numbers)
     : scene_(scene),
-      traced_(scene_, threads, {.closed = closed, .image = true}),
+      flat_(without_idle_normals(scene)),
+      traced_(flat_ ? *flat_ : scene_, threads, {.closed = closed, .image = true}),
       camera_(scene_.camera),
       filter_(scene_.film.filter),
       numbers_(numbers),
@@ -104,8 +116,7 @@ void RadianceEstimator::add_shared(std::span<const KeyedSample> samples,
   const FilmRays rays(scene_, camera_, samples, places);
   const auto add = [&](const auto& walks) {
     const size_t side = 2 * reach_ + 1;
-    Footprint sums;
-    sums.fill(std::vector<double>(side * side));
+    Footprint sums{};
     for (size_t i = 0; i < samples.size(); ++i) {
       const PixelSample& at = samples[i].at;
       const Rgb<double>& radiance = walks[i].sums.radiance;
@@ -134,10 +145,11 @@ void RadianceEstimator::add_shared(std::span<const KeyedSample> samples,
 // The sums are zero afterwards.
 void RadianceEstimator::add_footprint(const PixelSample& at, Footprint& sums,
                                       SampleSink& sink) const {
+  double* const pixels = sink.radiance_at(0);
   sink.serve(at, reach_, [&](size_t index, size_t k) {
-    for (int c = 0; c < 3; ++c) sink.radiance_at(index)[c] += sums[c][k];
+    for (int c = 0; c < 3; ++c) pixels[index + c] += sums[c][k];
   });
-  for (auto& sum : sums) std::fill(sum.begin(), sum.end(), 0.0);
+  sums = {};
 }
 
 }  // namespace limn

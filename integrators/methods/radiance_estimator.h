@@ -1,6 +1,7 @@
 #pragma once
 // The radiance of a scene as an estimator: images, and differences of images.
 #include <array>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -39,10 +40,12 @@ class RadianceEstimator final : public SampleEstimator {
   void add(const std::vector<Walk>& walks, std::span<const KeyedSample> samples, double weight,
            SampleSink& sink) const;
   // Weighted sums of a pixel's samples, for the pixels around it.
-  using Footprint = std::array<std::vector<double>, 3>;
+  using Footprint =
+      std::array<std::array<double, size_t{SharedPlace::kMostSide} * SharedPlace::kMostSide>, 3>;
   void add_footprint(const PixelSample& at, Footprint& sums, SampleSink& sink) const;
 
   const Scene& scene_;
+  std::optional<Scene> flat_;  // with the same image, in less time; none: scene_ itself
   TracedScene traced_;
   CameraView<double> camera_;
   FilterTable filter_;

@@ -151,7 +151,13 @@ class PathTracer {
                     const Rest& rest) const;
   // path_rays.h
   bool next_hit(Walk& walk);
+  void take_hit(Walk& walk, const RayQuery& query) const;
+  void next_hits(std::span<Walk* const> walks);
+  template <class Put, class Trace, class Read>
+  void trace_together(std::span<Walk* const> walks, const Put& put, const Trace& trace,
+                      const Read& read);
   bool shadowed(const Walk& walk);
+  size_t find_unshadowed(std::span<Walk*> walks);
   std::optional<FaceSide> blocked_at_start(const Walk& walk, const Vec3d& direction) const;
   void move_along_edge(SurfacePoint<Place>& surface, FaceRef face, const Vec3d& direction) const;
   void fetch_face(FaceRef face) const;

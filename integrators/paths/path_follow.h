@@ -35,15 +35,19 @@ template <class S, class Visitor>
 inline void PathTracer<S, Visitor>::follow_rays(std::span<const StartRay<Place>> rays,
                                                 std::span<Walk> walks) {
   DCHECK_LE(walks.size(), kMostWalks);
-  for (size_t i = 0; i < walks.size(); ++i) {
-    Walk& walk = walks[i];
-    guarded(walk, [&] {
-      ++rays_.closest;
-      walk.found = c_.tracer.closest(rays[i].ray, walk.hit);
-      return true;
-    });
-    if (walk.found) fetch_face(walk.hit.face);
-  }
+  Walk* started[kMostWalks];
+  for (size_t i = 0; i < walks.size(); ++i) started[i] = &walks[i];
+  trace_together(
+      {started, walks.size()},
+      [&](const Walk& walk, RayQuery& query) {
+        query.ray = rays[static_cast<size_t>(&walk - walks.data())].ray;
+        return true;
+      },
+      [&](std::span<RayQuery> queries) {
+        rays_.closest += queries.size();
+        c_.tracer.closest_each(queries);
+      },
+      [&](Walk& walk, const RayQuery& query) { take_hit(walk, query); });
   for (const Walk& walk : walks) fetch_corners(walk);
   follow_seen(rays, walks);
 }
@@ -105,10 +109,10 @@ inline void PathTracer<S, Visitor>::follow(std::span<Walk* const> walks) {
     count += turns;
     Walk* leaving[kMostWalks];
     size_t left = 0;
+    next_hits({going, count});
     keep([&](Walk& walk) {
-      walk.found = next_hit(walk);
       leaving[left] = &walk;
-      left += !walk.found;
+      left += !walk.found && !walk.failed;
       return walk.found;
     });
     for (size_t i = 0; i < count; ++i) fetch_corners(*going[i]);

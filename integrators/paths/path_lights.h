@@ -59,12 +59,7 @@ template <class S, class Visitor>
 inline void PathTracer<S, Visitor>::shine(std::span<Walk* const> walks) {
   Walk* lit[kMostWalks];
   const size_t count = weigh_lights(walks, lit);
-  size_t seen = 0;
-  for (size_t i = 0; i < count; ++i) {
-    Walk* const walk = lit[i];
-    lit[seen] = walk;
-    seen += guarded(*walk, [&] { return !shadowed(*walk); });
-  }
+  const size_t seen = find_unshadowed({lit, count});
   for (size_t i = 0; i < seen; ++i) add_light(*lit[i]);
 }
 

@@ -31,6 +31,63 @@ inline bool PathTracer<S, Visitor>::next_hit(Walk& walk) {
   return found;
 }
 
+// The next surfaces from path vertices: sets what is found.
+template <class S, class Visitor>
+inline void PathTracer<S, Visitor>::next_hits(std::span<Walk* const> walks) {
+  trace_together(
+      walks,
+      [&](Walk& walk, RayQuery& query) {
+        // Where no shape emits, what hides the environment from the last scattering need not be
+        // known.
+        if (walk.start_edge() || (walk.last && !c_.lights.on_shapes())) {
+          walk.found = false;
+          guarded(walk, [&] { return walk.found = next_hit(walk); });
+          return false;
+        }
+        // Copies of what has just been written in small parts would wait for it.
+        query.ray.origin = value(walk.surface.p);
+        query.ray.direction = walk.wo;
+        query.ray.start = walk.surface.start();
+        query.normal = walk.surface.n_g;
+        return true;
+      },
+      [&](std::span<RayQuery> queries) {
+        rays_.closest += queries.size();
+        c_.tracer.closest_each(queries);
+      },
+      [&](Walk& walk, const RayQuery& query) { take_hit(walk, query); });
+}
+
+template <class S, class Visitor>
+inline void PathTracer<S, Visitor>::take_hit(Walk& walk, const RayQuery& query) const {
+  walk.failed = query.failed;
+  walk.found = query.found;
+  walk.hit = query.hit;
+  if (walk.found) fetch_face(walk.hit.face);
+}
+
+// Traces a ray for each: put(walk, query) writes it, or returns false where there is none;
+// trace(queries) does it, read(walk, query) takes what comes of it.
+template <class S, class Visitor>
+template <class Put, class Trace, class Read>
+inline void PathTracer<S, Visitor>::trace_together(std::span<Walk* const> walks, const Put& put,
+                                                   const Trace& trace, const Read& read) {
+  RayQuery queries[RayTracer::kTogether];
+  Walk* asking[RayTracer::kTogether];
+  size_t count = 0;
+  const auto answer = [&] {
+    trace(std::span<RayQuery>(queries, count));
+    for (size_t i = 0; i < count; ++i) read(*asking[i], queries[i]);
+    count = 0;
+  };
+  for (Walk* const walk : walks) {
+    if (!put(*walk, queries[count])) continue;
+    asking[count++] = walk;
+    if (count == RayTracer::kTogether) answer();
+  }
+  if (count > 0) answer();
+}
+
 // The side of a face around walk.start_edge() that the ray meets at once, if any. Below its own
 // face a ray that is reflected leaves a smooth surface (surface_point.h), and meets none of them.
 template <class S, class Visitor>
@@ -108,6 +165,44 @@ inline void PathTracer<S, Visitor>::find_sky(std::span<Walk* const> walks) const
   environment.find_each({found, walks.size()});
 }
 
+// A float's rounding before the light, so that neighbours of the chosen face do not hide the point.
+inline double before(const LightSample& light) { return light.distance * (1 - 0x1p-20); }
+
+// How many see the lights that were drawn: they are put first.
+template <class S, class Visitor>
+inline size_t PathTracer<S, Visitor>::find_unshadowed(std::span<Walk*> walks) {
+  size_t seen = 0;
+  trace_together(
+      walks,
+      [&](Walk& walk, RayQuery& query) {
+        if (walk.start_edge() || walk.beside_edge || walk.two_sided) {
+          walks[seen] = &walk;
+          seen += guarded(walk, [&] { return !shadowed(walk); });
+          return false;
+        }
+        const LightSample& light = *walk.light;
+        const FaceRef start = walk.surface.start();
+        if (light.face == start) return false;
+        query.ray.origin = value(walk.surface.p);
+        query.ray.direction = light.wo;
+        query.ray.t_max = before(light);
+        query.ray.start = start;
+        query.ray.end = light.face.value_or(FaceRef{});
+        query.normal = walk.surface.n_g;
+        return true;
+      },
+      [&](std::span<RayQuery> queries) {
+        rays_.shadow += queries.size();
+        c_.tracer.occluded_each(queries);
+      },
+      [&](Walk& walk, const RayQuery& query) {
+        walk.failed = query.failed;
+        walks[seen] = &walk;
+        seen += !query.failed && !query.found;
+      });
+  return seen;
+}
+
 template <class S, class Visitor>
 inline bool PathTracer<S, Visitor>::shadowed(const Walk& walk) {
   const LightSample& light = *walk.light;
@@ -133,9 +228,7 @@ inline bool PathTracer<S, Visitor>::shadowed(const Walk& walk) {
     if (blocked_at_start(walk, ray.direction)) return true;
     ray.skip_faces = edge->around.all;
   }
-  // Ends a float's rounding before the light, so that neighbours of the chosen face do not hide
-  // the point.
-  ray.t_max = light.distance * (1 - 0x1p-20);
+  ray.t_max = before(light);
   ++rays_.shadow;
   if (edge) return occluded_from_edge(c_.tracer, c_.scene, edge->around, ray);
   return c_.tracer.occluded(ray);

@@ -122,6 +122,21 @@ void update_shading_tangents(Mesh& mesh) {
   }
 }
 
+bool has_idle_normals(const Mesh& mesh) {
+  constexpr double kRounding = 1e-6;  // of normals in files with six digits
+  if (mesh.normal_source == NormalSource::kFace || mesh.has_tangents) return false;
+  for (size_t f = 0; f < mesh.faces.size(); ++f) {
+    const auto c = face_corners<double>(mesh, FaceId(static_cast<uint32_t>(f)));
+    const Vec3d across = cross(c[1] - c[0], c[2] - c[0]);
+    const double area = length(across);
+    if (area == 0) continue;
+    for (const uint32_t i : mesh.normal_ids[f]) {
+      if (!(length(mesh.normals[i] - across * (1 / area)) <= kRounding)) return false;
+    }
+  }
+  return true;
+}
+
 Bounds bounds_of(const Mesh& mesh) {
   Bounds bounds;
   for (const FaceIndices& f : mesh.faces) {

@@ -6,6 +6,7 @@
 #endif
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -41,6 +42,12 @@ void intersect(RTCScene scene, QueryContext& context, RTCRayHit& query) {
 void occlude(RTCScene scene, QueryContext& context, RTCRay& query) {
   rtcOccluded1(scene, &context, &query);
 }
+void intersect(const int* valid, RTCScene scene, QueryContext& context, RTCRayHit8& queries) {
+  rtcIntersect8(valid, scene, &context, &queries);
+}
+void occlude(const int* valid, RTCScene scene, QueryContext& context, RTCRay8& queries) {
+  rtcOccluded8(valid, scene, &context, &queries);
+}
 #else
 struct QueryContext {
   RTCRayQueryContext base;
@@ -69,7 +76,20 @@ void occlude(RTCScene scene, QueryContext& context, RTCRay& query) {
   set(arguments, context);
   rtcOccluded1(scene, &query, &arguments);
 }
+void intersect(const int* valid, RTCScene scene, QueryContext& context, RTCRayHit8& queries) {
+  RTCIntersectArguments arguments;
+  rtcInitIntersectArguments(&arguments);
+  set(arguments, context);
+  rtcIntersect8(valid, scene, &queries, &arguments);
+}
+void occlude(const int* valid, RTCScene scene, QueryContext& context, RTCRay8& queries) {
+  RTCOccludedArguments arguments;
+  rtcInitOccludedArguments(&arguments);
+  set(arguments, context);
+  rtcOccluded8(valid, scene, &queries, &arguments);
+}
 #endif
+constexpr size_t kPacket = RayTracer::kTogether;
 
 struct Context {
   QueryContext base;  // must be first: Embree passes back a pointer to it
@@ -146,6 +166,25 @@ void reject_skipped(const RTCFilterFunctionNArguments* arguments) {
     arguments->valid[0] = 0;
 }
 
+struct PacketContext {
+  QueryContext base;  // first, as in Context
+  std::array<Context, kPacket> rays;
+};
+
+void reject_skipped_of_packet(const RTCFilterFunctionNArguments* arguments) {
+  const auto& packet = *reinterpret_cast<const PacketContext*>(arguments->context);
+  const unsigned n = arguments->N;
+  for (unsigned i = 0; i < n; ++i) {
+    if (arguments->valid[i] == 0) continue;
+    const Context& context = packet.rays[RTCRayN_id(arguments->ray, n, i)];
+    const FaceRef face =
+        face_of(RTCHitN_instID(arguments->hit, n, i, 0), RTCHitN_geomID(arguments->hit, n, i),
+                RTCHitN_primID(arguments->hit, n, i));
+    if (is_skipped(context, face) || is_rounding(context, face, RTCRayN_tfar(arguments->ray, n, i)))
+      arguments->valid[i] = 0;
+  }
+}
+
 RTCRay to_embree(const Ray& ray, const Vec3d& origin) {
   // The only place where rays enter Embree, which may crash on invalid ones.
   if (!is_traceable(ray)) [[unlikely]]
@@ -187,6 +226,15 @@ Vec3d origin_of(const Scene& scene) {
   for (int k = 0; k < 3; ++k)
     if (std::fabs(center[k]) > kFar * bounds.diagonal()) origin[k] = static_cast<float>(center[k]);
   return origin;
+}
+
+// Above a face by this much almost no ray that leaves it meets it: of 1.2 million in a Cornell box
+// 91, of 875,000 without. Four roundings of the largest coordinate.
+double clearance_of(const Scene& scene, const Vec3d& origin) {
+  if (scene.shapes.empty()) return 0;
+  const Bounds bounds = bounds_of(scene);
+  const Vec3d lower = bounds.lower - origin, upper = bounds.upper - origin;
+  return 0x1p-22 * largest_coordinate(std::array{lower, upper});
 }
 
 // Coordinates for a mesh of slivers that lie askew; none for other meshes.
@@ -237,7 +285,8 @@ class EmbreeTracer final : public RayTracer {
         overlaps_(faces_->overlaps),
         settles_(!copies_.empty() || !overlaps_.empty()),
         origin_(origin_of(scene)),
-        reach_(kReach * bounds_of(scene).diagonal()) {
+        reach_(kReach * bounds_of(scene).diagonal()),
+        clearance_(clearance_of(scene, origin_)) {
     // Without a number of threads: Embree would limit all of TBB to the machine's cores by it.
     device_.reset(rtcNewDevice(nullptr));
     if (!device_) throw InputError("Embree cannot start on this machine");
@@ -278,6 +327,18 @@ class EmbreeTracer final : public RayTracer {
     return query.tfar < 0;
   }
 
+  void closest_each(std::span<RayQuery> queries) const override {
+    for_packets(
+        queries, [&](auto packet) { closest_packet(packet); },
+        [&](RayQuery& query) { closest_alone(query); });
+  }
+
+  void occluded_each(std::span<RayQuery> queries) const override {
+    for_packets(
+        queries, [&](auto packet) { occluded_packet(packet); },
+        [&](RayQuery& query) { occluded_alone(query); });
+  }
+
   bool overlap(FaceRef a, FaceRef b) const override { return settles_ && overlaps_.contains(a, b); }
   void settle(const Ray& ray, Hit& hit) const override {
     if (settles_) [[unlikely]]
@@ -285,6 +346,129 @@ class EmbreeTracer final : public RayTracer {
   }
 
  private:
+  // Few rays are faster one by one, with the same bits.
+  template <class Packet, class Alone>
+  static void for_packets(std::span<RayQuery> queries, const Packet& packet, const Alone& alone) {
+    constexpr size_t kFewest = 4;  // not tuned
+    while (!queries.empty()) {
+      const auto next = queries.first(std::min(kPacket, queries.size()));
+      if (next.size() >= kFewest) {
+        packet(next);
+      } else {
+        std::for_each(next.begin(), next.end(), alone);
+      }
+      queries = queries.subspan(next.size());
+    }
+  }
+  // What is subtracted from where the ray starts: origin_, and the clearance above a face.
+  Vec3d origin_for(const RayQuery& query) const {
+    if (!query.ray.start.shape.valid()) return origin_;
+    const Vec3d& n = query.normal;
+    return origin_ - n * std::copysign(clearance_, dot(n, query.ray.direction));
+  }
+  // Of rays that cannot be traced: what is valid is 0.
+  template <class Rays>
+  void put(std::span<RayQuery> queries, int* valid, Rays& rays) const {
+    for (size_t i = 0; i < kPacket; ++i) {
+      valid[i] = i < queries.size() && is_traceable(queries[i].ray) ? -1 : 0;
+      if (valid[i] == 0) continue;
+      const Ray& ray = queries[i].ray;
+      const Vec3d from = ray.origin - origin_for(queries[i]);
+      rays.org_x[i] = static_cast<float>(from.x);
+      rays.org_y[i] = static_cast<float>(from.y);
+      rays.org_z[i] = static_cast<float>(from.z);
+      rays.dir_x[i] = static_cast<float>(ray.direction.x);
+      rays.dir_y[i] = static_cast<float>(ray.direction.y);
+      rays.dir_z[i] = static_cast<float>(ray.direction.z);
+      rays.tnear[i] = static_cast<float>(ray.t_min);
+      rays.tfar[i] =
+          ray.t_max > 3e38 ? std::numeric_limits<float>::infinity() : static_cast<float>(ray.t_max);
+      rays.time[i] = 0;
+      rays.mask[i] = ~0u;
+      rays.id[i] = static_cast<unsigned>(i);
+      rays.flags[i] = 0;
+    }
+  }
+  // What the ray meets without a filter. Hardly any meets what it ignores: those that do are traced
+  // again.
+  void take(RayQuery& query, FaceRef face, double t) const {
+    query.found = face.shape.valid();
+    if (query.found) {
+      query.hit = {face, t};
+      const Context own = make_context(query.ray);
+      if (own.base.filter && (is_skipped(own, face) || is_rounding(own, face, t))) {
+        query.found = closest(query.ray, query.hit);
+        return;
+      }
+      settle(query.ray, query.hit);
+    }
+    if (!settles_) [[likely]]
+      return;
+    Hit left = query.found ? query.hit : Hit{{}, query.ray.t_max};
+    if (!overlaps_.leave(query.ray, left)) return;
+    query.hit = left;
+    query.found = true;
+  }
+  void closest_alone(RayQuery& query) const {
+    query.failed = !is_traceable(query.ray);
+    if (query.failed) return;
+    RTCRayHit one;
+    one.ray = to_embree(query.ray, origin_for(query));
+    one.hit.geomID = one.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+    QueryContext context;
+    start(context, nullptr);
+    intersect(rtc_scene_.get(), context, one);
+    const bool found = one.hit.geomID != RTC_INVALID_GEOMETRY_ID;
+    take(query, found ? face_of(one.hit.instID[0], one.hit.geomID, one.hit.primID) : FaceRef{},
+         one.ray.tfar);
+  }
+  void closest_packet(std::span<RayQuery> queries) const {
+    alignas(32) int valid[kPacket];
+    RTCRayHit8 packet;
+    put(queries, valid, packet.ray);
+    for (size_t i = 0; i < kPacket; ++i)
+      packet.hit.geomID[i] = packet.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+    QueryContext context;
+    start(context, nullptr);
+    intersect(valid, rtc_scene_.get(), context, packet);
+    for (size_t i = 0; i < queries.size(); ++i) {
+      queries[i].failed = valid[i] == 0;
+      if (queries[i].failed) continue;
+      const bool found = packet.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
+      take(queries[i],
+           found ? face_of(packet.hit.instID[0][i], packet.hit.geomID[i], packet.hit.primID[i])
+                 : FaceRef{},
+           packet.ray.tfar[i]);
+    }
+  }
+  void occluded_alone(RayQuery& query) const {
+    query.failed = !is_traceable(query.ray);
+    query.found = !query.failed && settles_ && is_hidden_by_near(query.ray);
+    if (query.failed || query.found) return;
+    Context context = make_context(query.ray);
+    RTCRay one = to_embree(query.ray, origin_for(query));
+    occlude(rtc_scene_.get(), context.base, one);
+    query.found = one.tfar < 0;
+  }
+  void occluded_packet(std::span<RayQuery> queries) const {
+    alignas(32) int valid[kPacket];
+    RTCRay8 packet;
+    put(queries, valid, packet);
+    PacketContext context;
+    bool skips = false;
+    for (size_t i = 0; i < queries.size(); ++i) {
+      queries[i].failed = valid[i] == 0;
+      queries[i].found = settles_ && valid[i] != 0 && is_hidden_by_near(queries[i].ray);
+      if (queries[i].found) valid[i] = 0;
+      context.rays[i] = make_context(queries[i].ray);
+      skips |= context.rays[i].base.filter != nullptr;
+    }
+    start(context.base, skips ? reject_skipped_of_packet : nullptr);
+    occlude(valid, rtc_scene_.get(), context.base, packet);
+    for (size_t i = 0; i < queries.size(); ++i) {
+      if (valid[i] != 0) queries[i].found = packet.tfar[i] < 0;
+    }
+  }
   static bool has_none(const Scene& scene) { return scene.exposure && scene.exposure->no_overlaps; }
   // True if a coplanar or near face of the ray's end, or a near face of its start, occludes it.
   bool is_hidden_by_near(const Ray& ray) const {
@@ -386,6 +570,7 @@ class EmbreeTracer final : public RayTracer {
   bool settles_;  // duplicates, coplanar or near faces exist
   Vec3d origin_;  // origin of Embree's coordinates
   double reach_;
+  double clearance_;     // of the starts of rays that are traced together
   EmbreeErrors errors_;  // must be declared before the device that reports to it
   Owned<RTCDevice> device_;
   Owned<RTCScene> rtc_scene_;

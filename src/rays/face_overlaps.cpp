@@ -238,7 +238,7 @@ FaceOverlaps::FaceOverlaps(const Scene& scene, const DuplicateFaces& copies, int
     first_numbers_.push_back(faces);
     faces += shape.mesh.faces.size();
   }
-  has_others_.resize(faces);
+  has_others_.resize((faces + 63) / 64);
   std::vector<FoundPair> pairs = OverlapFinder(scene, copies, of, threads).find(threads);
   const size_t count = pairs.size();
   pairs.reserve(2 * count);
@@ -250,26 +250,42 @@ FaceOverlaps::FaceOverlaps(const Scene& scene, const DuplicateFaces& copies, int
     };
     return order(a) < order(b);
   });
+  const auto mark = [&](FaceRef face) {
+    const size_t i = number(face);
+    has_others_[i / 64] |= uint64_t{1} << i % 64;
+  };
+  for (const FoundPair& pair : pairs) mark(pair.faces.first);
+  for (const std::vector<FaceRef>& alike : copies.sets()) {
+    if (has_others(alike.front())) std::for_each(alike.begin(), alike.end(), mark);
+  }
+  size_t marked = 0;
+  for (const uint64_t word : has_others_) {
+    before_.push_back(marked);
+    marked += static_cast<size_t>(std::popcount(word));
+  }
+  ranges_.resize(marked);
   others_.reserve(pairs.size());
   for (const FoundPair& pair : pairs) {
-    const FaceRef face = pair.faces.first;
-    has_others_[number(face)] = true;
-    Range& range =
-        of_.try_emplace(key(face), Range{others_.size(), others_.size(), 0}).first->second;
+    Range& range = ranges_[range_of(pair.faces.first)];
+    if (range.end == 0) range = {others_.size(), others_.size(), 0};
     others_.push_back(pair.faces.second);
     range.end = others_.size();
     if (!pair.near) range.near = range.end;
   }
   for (const std::vector<FaceRef>& alike : copies.sets()) {
-    if (!has_others_[number(alike.front())]) continue;
-    for (const FaceRef copy : alike) has_others_[number(copy)] = true;
+    if (!has_others(alike.front())) continue;
+    for (const FaceRef copy : alike) ranges_[range_of(copy)] = ranges_[range_of(alike.front())];
   }
 }
 
+size_t FaceOverlaps::range_of(FaceRef face) const {
+  const size_t i = number(face);
+  const uint64_t earlier = has_others_[i / 64] & ((uint64_t{1} << i % 64) - 1);
+  return before_[i / 64] + static_cast<size_t>(std::popcount(earlier));
+}
+
 FaceOverlaps::Found FaceOverlaps::find(FaceRef face) const {
-  const auto found = of_.find(key(face));
-  if (found == of_.end()) return {};
-  const auto [begin, near, end] = found->second;
+  const auto [begin, near, end] = ranges_[range_of(face)];
   const std::span<const FaceRef> all(others_);
   return {all.subspan(begin, near - begin), all.subspan(near, end - near)};
 }
@@ -279,7 +295,7 @@ std::vector<FacePair> FaceOverlaps::pairs() const {
   for (uint32_t s = 0; s < scene_->shapes.size(); ++s) {
     for (uint32_t f = 0; f < scene_->shapes[s].mesh.faces.size(); ++f) {
       const FaceRef face{ShapeId(s), FaceId(f)};
-      if (!has_others_[number(face)] || copies_->first(face) != face) continue;
+      if (!has_others(face) || copies_->first(face) != face) continue;
       for (const FaceRef other : of(face))
         if (place(face) < place(other)) pairs.push_back({face, other});
     }
@@ -320,8 +336,8 @@ static bool is_skipped(FaceRef face, const Ray& ray) {
          std::find(ray.skip_faces.begin(), ray.skip_faces.end(), face) != ray.skip_faces.end();
 }
 
-void FaceOverlaps::settle_in_plane(const Ray& ray, Hit& hit) const {
-  const auto others = of(hit.face);
+void FaceOverlaps::settle_in_plane(std::span<const FaceRef> others, const Ray& ray,
+                                   Hit& hit) const {
   const auto met = [&](FaceRef face) {
     return copies_->met(face, ray.direction, ray.skip_emitters);
   };
@@ -349,22 +365,23 @@ std::optional<Hit> FaceOverlaps::first_of(std::span<const FaceRef> faces, const 
 
 void FaceOverlaps::settle_among(const Ray& ray, Hit& hit) const {
   // A near face in front may itself have near faces in front of it; each is closer than the last.
+  std::span<const FaceRef> in_plane, near;
   for (;;) {
-    const auto near = found_of(hit.face).second;
+    std::tie(in_plane, near) = found_of(hit.face);
     if (near.empty()) break;
     const auto own = meet(corners_of(*scene_, hit.face), ray);
     const auto first = first_of(near, ray, own.value_or(hit.t));
     if (!first) break;
     hit = *first;
   }
-  settle_in_plane(ray, hit);
+  settle_in_plane(in_plane, ray, hit);
 }
 
 bool FaceOverlaps::leave_near(const Ray& ray, Hit& hit) const {
   const auto first = first_of(found_of(ray.start).second, ray, hit.t);
   if (!first) return false;
   hit = *first;
-  settle_in_plane(ray, hit);
+  settle_in_plane(of(hit.face), ray, hit);
   return true;
 }
 
@@ -377,7 +394,7 @@ bool FaceOverlaps::arrives_hidden(const Ray& ray) const {
 
 bool FaceOverlaps::is_hidden(FaceRef face, const Ray& ray) const {
   Hit hit{face, 0};
-  settle_in_plane(ray, hit);
+  settle_in_plane(of(face), ray, hit);
   return hit.face != face;
 }
 

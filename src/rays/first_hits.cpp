@@ -22,7 +22,27 @@ FirstHit describe(const Scene& scene, const Ray& ray, const Hit& hit) {
   return first;
 }
 
+// ask(ray, hit) for each.
+template <class Ask>
+void answer(std::span<RayQuery> queries, const Ask& ask) {
+  for (RayQuery& query : queries) {
+    try {
+      query.found = ask(query.ray, query.hit);
+    } catch (const UntraceableRay&) {
+      query.failed = true;
+    }
+  }
+}
+
 }  // namespace
+
+void RayTracer::closest_each(std::span<RayQuery> queries) const {
+  answer(queries, [&](const Ray& ray, Hit& hit) { return closest(ray, hit); });
+}
+
+void RayTracer::occluded_each(std::span<RayQuery> queries) const {
+  answer(queries, [&](const Ray& ray, Hit&) { return occluded(ray); });
+}
 
 std::vector<FirstHit> first_hits(const Scene& scene, const std::vector<Vec3d>& origins,
                                  const std::vector<Vec3d>& directions, int threads) {

@@ -100,6 +100,69 @@ TEST_P(RayTracers, AgreeButForRounding) {
   EXPECT_LT(at_borders, kRays / 500);
 }
 
+// Rays that leave the faces where others ended, some to ignore what they meet next.
+TEST_P(RayTracers, TraceTogetherAsAlone) {
+  const double unit = GetParam();
+  const Scene scene = some_scene(unit);
+  const auto embree = make_embree_tracer(scene, 1);
+  Rng rng(7, 8, 9);
+  int hits = 0, different = 0, failed = 0;
+  constexpr int kRounds = 600;
+  for (int round = 0; round < kRounds; ++round) {
+    std::vector<RayQuery> queries(1 + round % 19);
+    std::vector<std::array<FaceRef, 1>> skipped(queries.size());
+    for (size_t i = 0; i < queries.size(); ++i) {
+      Ray& ray = queries[i].ray;
+      ray = {random_direction(rng) * (2 * rng.uniform() * unit), random_direction(rng)};
+      Hit hit;
+      if (i % 5 != 4 && embree->closest(ray, hit)) {
+        const auto c = face_corners<double>(scene.shape(hit.face.shape).mesh, hit.face.face);
+        const Vec3d n = normalize(cross(c[1] - c[0], c[2] - c[0]));
+        const double t = dot(c[0] - ray.origin, n) / dot(ray.direction, n);
+        ray = {ray.origin + ray.direction * t, random_direction(rng)};
+        ray.start = hit.face;
+        queries[i].normal = n;
+        if (i % 3 == 0 && embree->closest(ray, hit)) {
+          skipped[i] = {hit.face};
+          ray.skip_faces = skipped[i];
+        }
+      }
+      ray.skip_emitters = i % 4 == 1;
+      if (i % 7 == 6) ray.t_max = rng.uniform() * unit;
+      if (round % 11 == 0 && i == 2) ray.origin.x = std::numeric_limits<double>::quiet_NaN();
+    }
+    std::vector<RayQuery> shadows = queries;
+    embree->closest_each(queries);
+    embree->occluded_each(shadows);
+    for (size_t i = 0; i < queries.size(); ++i) {
+      const RayQuery& query = queries[i];
+      ASSERT_EQ(query.failed, std::isnan(query.ray.origin.x));
+      ASSERT_EQ(shadows[i].failed, query.failed);
+      failed += query.failed;
+      if (query.failed) continue;
+      RayQuery alone = query, shadow = query;
+      embree->closest_each({&alone, 1});
+      embree->occluded_each({&shadow, 1});
+      ASSERT_EQ(alone.found, query.found);
+      ASSERT_EQ(shadow.found, shadows[i].found);
+      if (query.found) {
+        ASSERT_EQ(alone.hit.face, query.hit.face);
+        ASSERT_EQ(alone.hit.t, query.hit.t);
+      }
+      Hit hit;
+      const bool found = embree->closest(query.ray, hit);
+      hits += found;
+      different +=
+          found != query.found ||
+          (found && (hit.face != query.hit.face || std::fabs(hit.t - query.hit.t) > 1e-4 * unit)) ||
+          embree->occluded(query.ray) != shadows[i].found;
+    }
+  }
+  EXPECT_GT(hits, 2000);
+  EXPECT_GT(failed, 20);
+  EXPECT_LE(different, 3);  // by rounding, where faces meet
+}
+
 // The largest puts coordinates near kLargestCoordinate.
 INSTANTIATE_TEST_SUITE_P(, RayTracers, testing::Values(1e-3, 1.0, 1e4, 5e11), [](const auto& test) {
   return test.param < 1 ? "small" : test.param < 2 ? "one" : test.param < 1e5 ? "large" : "largest";

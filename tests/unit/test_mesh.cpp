@@ -197,6 +197,24 @@ TEST(Normals, StayWhereAllMovesAsOne) {
   EXPECT_NE(mesh.normal_tangents[8].x[0], 0);
 }
 
+// Of faces with corners of their own normals turn nowhere.
+TEST(Normals, AreIdleWhereTheyAreThoseOfFaces) {
+  Mesh apart = make_mesh({{0, 0, 0}, {1, 0, 0}, {0, 1, 0.5}, {2, 0, 0}, {2, 2, 0}, {2, 0, 1}},
+                         {{0, 1, 2}, {3, 4, 5}});
+  EXPECT_FALSE(has_idle_normals(apart));  // it has none
+  apart.normal_source = NormalSource::kComputed;
+  update_shading_normals(apart);
+  EXPECT_TRUE(has_idle_normals(apart));
+  Mesh turned = apart;
+  turned.normals[1] = normalize(turned.normals[1] + Vec3d{1e-5, 0, 0});
+  EXPECT_FALSE(has_idle_normals(turned));
+  turned = apart;
+  for (size_t n = 0; n < turned.normals.size(); ++n) turned.normals[n] = -apart.normals[n];
+  EXPECT_FALSE(has_idle_normals(turned));
+  Mesh cube = with_smooth_normals(cube_mesh());
+  EXPECT_FALSE(has_idle_normals(cube));
+}
+
 // Fins around an axis, as a file rounds them: normals along the axis cancel.
 TEST(Normals, CancelledOnesAreFinite) {
   std::vector<Vec3f> x{{0, -1, 0}, {0, 1, 0}};

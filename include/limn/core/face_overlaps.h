@@ -5,7 +5,6 @@
 #include <memory>
 #include <optional>
 #include <span>
-#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -28,7 +27,7 @@ class FaceOverlaps {
 
   static constexpr size_t kMostPairs = 1 << 24;  // about 0.9 GB
 
-  bool empty() const { return of_.empty(); }
+  bool empty() const { return others_.empty(); }
   // Coplanar pairs, each once, in file order.
   std::vector<std::pair<FaceRef, FaceRef>> pairs() const;
   // Faces coplanar with `face` (or with its first duplicate) that overlap it; none for no face.
@@ -73,17 +72,22 @@ class FaceOverlaps {
     return uint64_t{face.shape.index()} << 32 | face.face.index();
   }
   using Found = std::pair<std::span<const FaceRef>, std::span<const FaceRef>>;  // coplanar, near
-  Found found_of(FaceRef face) const {
-    return has_others(face) ? find(copies_->first(face)) : Found{};
+  Found found_of(FaceRef face) const { return has_others(face) ? find(face) : Found{}; }
+  bool has_others(FaceRef face) const {
+    if (!face.shape.valid()) return false;
+    const size_t i = number(face);
+    return (has_others_[i / 64] >> i % 64 & 1) != 0;
   }
-  bool has_others(FaceRef face) const { return face.shape.valid() && has_others_[number(face)]; }
   size_t number(FaceRef face) const {
     return first_numbers_[face.shape.index()] + face.face.index();
   }
+  // For a face that has others.
   Found find(FaceRef face) const;
+  size_t range_of(FaceRef face) const;
   void settle_among(const Ray& ray, Hit& hit) const;
   bool leave_near(const Ray& ray, Hit& hit) const;
-  void settle_in_plane(const Ray& ray, Hit& hit) const;
+  // others: of(hit.face).
+  void settle_in_plane(std::span<const FaceRef> others, const Ray& ray, Hit& hit) const;
   std::optional<Hit> first_of(std::span<const FaceRef> faces, const Ray& ray, double before) const;
 
   const Scene* scene_;
@@ -91,12 +95,13 @@ class FaceOverlaps {
   std::vector<size_t> first_numbers_;  // first face number of each shape
   // True for a face in any pair, or a duplicate of one. Queried twice per ray; most faces are in no
   // pair.
-  std::vector<bool> has_others_;
+  std::vector<uint64_t> has_others_;  // a bit for each face
+  std::vector<size_t> before_;        // for each of the words: the number of bits before it
   std::vector<FaceRef> others_;
   struct Range {
-    size_t begin, near, end;  // in others_: coplanar faces, then near ones
+    size_t begin = 0, near = 0, end = 0;  // in others_: coplanar faces, then near ones
   };
-  std::unordered_map<uint64_t, Range> of_;
+  std::vector<Range> ranges_;  // of each face that has others
 };
 
 // One warning for each pair of shapes with duplicate or coplanar overlapping faces that face the

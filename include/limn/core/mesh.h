@@ -109,6 +109,9 @@ std::array<Vec3<P>, 3> face_corners(const Mesh& mesh, FaceId face) {
   return corners;
 }
 
+// True if the normals that a mesh interpolates are everywhere those of its faces, to rounding.
+bool has_idle_normals(const Mesh& mesh);
+
 // Fills `weld` from the positions: vertices with bitwise equal coordinates (-0 = 0) get the
 // smallest of their indices.
 void weld_positions(Mesh& mesh);
