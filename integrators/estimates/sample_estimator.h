@@ -96,6 +96,20 @@ struct BatchSums {
   NonFinite non_finite;
 };
 
+// How many paths a pixel takes of each sample that serves it: so many, or all there are.
+struct PathsTaken {
+  int x0 = 0, y0 = 0, width = 0;  // of the film's crop
+  std::vector<uint8_t> counts;    // of its pixels; empty: all
+  int at(int x, int y) const { return counts[static_cast<size_t>(y - y0) * width + (x - x0)]; }
+};
+
+// A path of a sample, or what is drawn along it.
+struct SharedPath {
+  const SharedPlace* place = nullptr;  // null: its own pixel's alone
+  int number = 0, paths = 1;           // which of the sample's paths, and how many there are
+  const PathsTaken* taken = nullptr;   // null: all take it, with its weight
+};
+
 // Where the samples of one tile go. Pixels of different tiles do not overlap unless samples are
 // shared, so that tiles share the images; costs and what was not finite are a tile's own.
 class SampleSink {
@@ -112,34 +126,31 @@ class SampleSink {
         non_finite_(non_finite),
         log_(log) {}
 
-  // place: where the sample lies in its pixel if all pixels that it reaches have a share of it;
-  // null: its own alone.
   void add_radiance(const PixelSample& at, const Rgb<double>& radiance, double weight,
-                    const SharedPlace* place = nullptr) {
-    share(at, weight, place, [&](size_t index, double share) {
+                    const SharedPath& path = {}) {
+    share(at, weight, path, [&](size_t index, double share) {
       for (int c = 0; c < 3; ++c) sums_.radiance[index + c] += radiance[c] * share;
     });
   }
   // Three sums; they stay where they are until the batch ends.
-  double* radiance_of(const PixelSample& at) { return radiance_at(pixel_index(film_, at.x, at.y)); }
-  double* radiance_at(size_t index) { return &sums_.radiance[index]; }
+  double* radiance_at(int x, int y) { return &sums_.radiance[pixel_index(film_, x, y)]; }
   void add(size_t slot, const PixelSample& at, const Rgb<Lanes>& value, double weight,
-           const SharedPlace* place = nullptr) {
+           const SharedPath& path = {}) {
     std::vector<double>* const images = &sums_.images[slot * lanes_];
     for (int k = 0; k < lanes_; ++k) {
       if (images[k].empty()) images[k].assign(film_size(film_), 0.0);
     }
-    share(at, weight, place, [&](size_t index, double share) {
+    share(at, weight, path, [&](size_t index, double share) {
       for (int k = 0; k < lanes_; ++k) {
         for (int c = 0; c < 3; ++c) images[k][index + c] += value[c][k] * share;
       }
     });
-    const double squares = place ? place->squares : 1;
+    const double squares = path.place ? path.place->squares : 1;
     costs_[slot].largest.add(squares * squared_magnitude(value, weight, lanes_, lane_scale_),
                              {at.x, at.y, at.s, ""});
   }
-  // Calls add(pixel_index, k) for pixels that samples reach that lie in a pixel and are shared: k
-  // counts the weights of SharedPlace.
+  // Calls add(x, y, k) for pixels that samples reach that lie in a pixel and are shared: k counts
+  // the weights of SharedPlace.
   template <class Add>
   void serve(const PixelSample& at, int reach, const Add& add) const {
     const bool all =
@@ -148,7 +159,7 @@ class SampleSink {
     for (int row = -reach; row <= reach; ++row) {
       for (int column = -reach; column <= reach; ++column, ++k) {
         const int x = at.x - column, y = at.y - row;
-        if (all || served_.holds(x, y)) add(pixel_index(film_, x, y), k);
+        if (all || served_.holds(x, y)) add(x, y, k);
       }
     }
   }
@@ -172,10 +183,17 @@ class SampleSink {
  private:
   // Calls add(pixel_index, weight) for all pixels that the sample adds to.
   template <class Add>
-  void share(const PixelSample& at, double weight, const SharedPlace* place, const Add& add) const {
-    if (!place) return add(pixel_index(film_, at.x, at.y), weight);
-    serve(at, place->reach,
-          [&](size_t index, size_t k) { add(index, place->weights[k] * weight); });
+  void share(const PixelSample& at, double weight, const SharedPath& path, const Add& add) const {
+    if (!path.place) return add(pixel_index(film_, at.x, at.y), weight);
+    serve(at, path.place->reach, [&](int x, int y, size_t k) {
+      double part = weight;
+      if (path.taken) {
+        const int taken = std::min(path.paths, path.taken->at(x, y));
+        if (path.number >= taken) return;
+        part = 1.0 / taken;
+      }
+      add(pixel_index(film_, x, y), path.place->weights[k] * part);
+    });
   }
 
   const Film& film_;

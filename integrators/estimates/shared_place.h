@@ -5,10 +5,11 @@
 // a place d in a pixel, of density S(d) = sum_m f(d + m) along each axis; given d, f(d + m) / S(d)
 // draws m. Here d alone is drawn, and all m are taken with these weights. So an image has the same
 // expectation, and less variance, as nothing is left of the choice of m. The weights add up to 1
-// where all pixels have as many paths. Pixels whose filters the film's border cuts have samples of
-// their own; with sample_border there are none, and pixels around the film have samples for it. As
-// places are those of all pixels, so are their errors: where nothing else is random, the variance
-// of a sum of pixels is up to their number times the sum of variances. Sums batch by batch show it.
+// where all pixels have as many paths, see SamplePlan::share_paths. Pixels whose filters the film's
+// border cuts have samples of their own; with sample_border there are none, and pixels around the
+// film have samples for it. As places are those of all pixels, so are their errors: sums over films
+// with edges along rows or columns may have more variance than with places of their own. Sums batch
+// by batch show it.
 #include <array>
 
 #include "integrators/estimates/tiles.h"

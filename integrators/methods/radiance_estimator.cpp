@@ -100,7 +100,7 @@ void RadianceEstimator::add(const std::vector<Walk>& walks, std::span<const Keye
       sink.reject(samples[i].at, slot_name(0));
       continue;
     }
-    if (double* const at = sink.radiance_of(samples[i].at); at != pixel) {
+    if (double* const at = sink.radiance_at(samples[i].at.x, samples[i].at.y); at != pixel) {
       leave_pixel();
       pixel = at;
       sum = {at[0], at[1], at[2]};
@@ -145,9 +145,9 @@ void RadianceEstimator::add_shared(std::span<const KeyedSample> samples,
 // The sums are zero afterwards.
 void RadianceEstimator::add_footprint(const PixelSample& at, Footprint& sums,
                                       SampleSink& sink) const {
-  double* const pixels = sink.radiance_at(0);
-  sink.serve(at, reach_, [&](size_t index, size_t k) {
-    for (int c = 0; c < 3; ++c) pixels[index + c] += sums[c][k];
+  sink.serve(at, reach_, [&](int x, int y, size_t k) {
+    double* const pixel = sink.radiance_at(x, y);
+    for (int c = 0; c < 3; ++c) pixel[c] += sums[c][k];
   });
   sums = {};
 }

@@ -271,7 +271,7 @@ class TermJob {
       }
       if (!options_.samples && !plan.film.empty()) describe_film(plan.film, result);
       pass(p).set_plan(plan);
-      add_pixel_samples(pass(p), plan, result);
+      add_pixel_samples(pass(p), pass(p).plan(), result);
     }
     for (size_t t = 0; t < types_.size(); ++t) result.terms[t].samples = means[t];
     if (result.pilot_spp > 0) result.stats.setup.emplace_back("pilot", pilot_watch.seconds());

@@ -53,8 +53,13 @@ struct SamplePlan {
   // those that little light comes from fewer edges.
   bool splits = false;
   Numbers numbers = Numbers::kIndependent;
+  PathsTaken taken;  // see share_paths
 
   PixelCounts counts_at(const PixelSample& at) const;
+  // Where samples are shared: gives pixels as many of the paths that `slot` counts as any near them
+  // wishes for, and lets a pixel take only so many of each sample as all near it have: so weights
+  // add up to 1 for each path. What is shared stays as it is.
+  void share_paths(size_t slot, int reach, const Film& shown);
   const DirectionField* field_at(const PixelSample& at) const {
     return fields.empty() ? nullptr : &fields[grid.index(at.x, at.y)];
   }

@@ -95,6 +95,7 @@ void TermEstimator::set_plan(SamplePlan plan) {
   plan_ = std::move(plan);
   reach_ = traced_.context().closed ? 0 : shared_reach(scene_.film, plan_.numbers);
   most_paths_ = std::max(1, static_cast<int>(plan_.uniform[pixel_slot_]));
+  if (reach() > 0) plan_.share_paths(pixel_slot_, reach_, scene_.film);
   for (const PixelCounts& counts : plan_.counts) {
     most_paths_ = std::max(most_paths_, static_cast<int>(counts[pixel_slot_]));
   }
@@ -178,7 +179,7 @@ void TermEstimator::add_samples(std::span<const KeyedSample> samples,
     const int paths = paths_ ? static_cast<int>(counts[pixel_slot_]) : 1;
     const int all = paths * places_of_path();
     for (int i = 0; i < all; ++i) {
-      batch.add({at, i >= paths, shared(s, i)}, key.path(i % paths), 1.0 / all,
+      batch.add({at, i >= paths, shared(s, i), i}, key.path(i % paths), 1.0 / all,
                 i == 0 && vertices_ ? &counts : nullptr);
     }
   }
@@ -230,7 +231,7 @@ void TermEstimator::add_logged(const PixelSample& at, const Rng& key, const Shar
   const int paths = paths_ ? static_cast<int>(counts[pixel_slot_]) : 1;
   const int all = paths * places_of_path();
   const auto add = [&](auto& visitor, int i) {
-    const PathStart start{at, i >= paths, shared ? shared + i : nullptr};
+    const PathStart start{at, i >= paths, shared ? shared + i : nullptr, i};
     const Path path = trace_one(start, key.path(i % paths), plan_.field_at(at), visitor, sink.log(),
                                 sink.cost(pixel_slot_));
     add_path(start, path, 1.0 / all, sink);
@@ -254,7 +255,7 @@ void TermEstimator::add_vertices(const PathStart& start, const VertexTerms& vert
   for (size_t slot = 0; slot < terms_.size(); ++slot) {
     if (!terms_[slot] || !terms_[slot]->uses_vertices()) continue;
     if (is_finite(vertices.sum(slot))) {
-      sink.add(slot, start.at, vertices.sum(slot), 1.0 / vertices.counts()[slot], start.shared);
+      sink.add(slot, start.at, vertices.sum(slot), 1.0 / vertices.counts()[slot], {start.shared});
     } else {
       sink.reject(start.at, slot_name(slot));
     }
@@ -342,11 +343,14 @@ void TermEstimator::add_path(const PathStart& start, const Path& path, double we
     sink.reject(at, slot_name(pixel_slot_));
     return;
   }
-  sink.add_radiance(at, value(path.found.radiance), weight, start.shared);
+  const SharedPath shared{start.shared, start.number,
+                          static_cast<int>(plan_.counts_at(at)[pixel_slot_]),
+                          plan_.taken.counts.empty() ? nullptr : &plan_.taken};
+  sink.add_radiance(at, value(path.found.radiance), weight, shared);
   for (size_t slot = 0; slot < terms_.size(); ++slot) {
     if (terms_[slot] && terms_[slot]->uses_paths()) {
       sink.add(slot, at, terms_[slot]->add_path(path.found.radiance) + path.found.score, weight,
-               start.shared);
+               shared);
     }
   }
 }

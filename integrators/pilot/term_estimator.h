@@ -133,6 +133,7 @@ class TermEstimator final : public SampleEstimator {
     PixelSample at;
     bool mirrored = false;
     const SharedPlace* shared = nullptr;
+    int number = 0;  // of the path
   };
   // places: of shared samples, else empty.
   void add_samples(std::span<const KeyedSample> samples, std::span<const SharedPlace* const> places,

@@ -40,6 +40,7 @@ void TermEstimator::add_values(std::span<const KeyedSample> samples,
                                std::span<const SharedPlace* const> places, SampleSink& sink) const {
   std::vector<KeyedSample> paths;
   std::vector<const SharedPlace*> shared;  // of the paths, where samples are
+  std::vector<int> numbers;
   std::vector<double> weights;
   const auto finish = [&] {
     std::array<ValuePaths::Found, kMostTogether> found;
@@ -49,11 +50,12 @@ void TermEstimator::add_values(std::span<const KeyedSample> samples,
     for (size_t i = 0; i < paths.size(); ++i) {
       PathSums<Dual> sums;
       sums.radiance = found[i].radiance;
-      add_path({paths[i].at, false, shared.empty() ? nullptr : shared[i]},
+      add_path({paths[i].at, false, shared.empty() ? nullptr : shared[i], numbers[i]},
                path_of(sums, found[i].failed), weights[i], sink);
     }
     paths.clear();
     shared.clear();
+    numbers.clear();
     weights.clear();
   };
   for (size_t s = 0; s < samples.size(); ++s) {
@@ -63,6 +65,7 @@ void TermEstimator::add_values(std::span<const KeyedSample> samples,
       if (paths.size() == kMostTogether) finish();
       if (!places.empty()) shared.push_back(places[s] + i);
       paths.push_back({at, key.path(i)});
+      numbers.push_back(i);
       weights.push_back(1.0 / count);
     }
   }

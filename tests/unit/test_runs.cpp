@@ -400,6 +400,44 @@ TEST(SharedPlaces, MakeDerivativesWithLessError) {
   }
 }
 
+// Where pixels have different numbers of paths and nothing else is random, weights of samples that
+// pixels share must still add up to one: else sums of a film have a hundred times the variance.
+TEST(SharedPlaces, LeaveSumsTheirVariance) {
+  const TempFiles files;
+  SceneParts parts;
+  parts.max_depth = 2;
+  parts.width = parts.height = 40;
+  parts.film = "<rfilter type=\"gaussian\"/>";
+  parts.body = square("floor", 8, -90, {0, 0, 0}, diffuse("chalk", "0.5")) +
+               square("board", 1, -30, {0.2, 1, 0}, diffuse("clay", "0.5")) +
+               R"(<emitter type="point"><point name="position" x="1.4" y="5" z="3"/>
+                  <rgb name="intensity" value="20"/></emitter>)";
+  const Scene scene = make_scene(files, parts);
+  GradientOptions options;
+  options.parameters = {"chalk.reflectance"};
+  options.samples.reset();
+  const auto with = [&](const std::string& method) {
+    options.method = Method(method);
+    return gradient(scene, options, run_settings(64, 2));
+  };
+  const GradientResult shared = with("adaptive"), own = with("adaptive:generator=independent");
+  const auto& counts = shared.terms[shared.term("interior")].pixel_samples;
+  ASSERT_FALSE(counts.empty());
+  const auto [least, most] = std::minmax_element(counts.begin(), counts.end());
+  EXPECT_GT(*most, *least);
+  const ParameterGradient &a = shared.parameters[0], &b = own.parameters[0];
+  double variance = 0, of_own = 0;
+  for (size_t i = 0; i < a.total.size(); ++i) {
+    variance += a.total.variance(i);
+    of_own += b.total.variance(i);
+  }
+  fmt::print("of the variance: pixels {:.3f}, sum {:.3f}\n", variance / of_own,
+             a.image_sum.variance(0) / b.image_sum.variance(0));
+  EXPECT_LT(variance, 0.2 * of_own);
+  EXPECT_LT(a.image_sum.variance(0), b.image_sum.variance(0));
+  EXPECT_GE(compare_moments(a.image_sum, b.image_sum).p_largest, 1e-5);
+}
+
 // Weights add up to one, and are the filter in the mean: integrals over pixels.
 TEST(SharedPlaces, HaveTheWeightsOfTheFilter) {
   for (const auto& [kind, radius] : {std::pair{Filter::Kind::kGaussian, 2.0},
