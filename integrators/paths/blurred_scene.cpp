@@ -64,7 +64,7 @@ BlurredScene::BlurredScene(const Scene& scene, const Blur& blur, int threads,
       faces_(scene, blur),
       tracer_(make_blur_tracer(faces_, threads)),
       emitters_(scene, blur),
-      lights_(emitters_.scene(), unmoved ? &unmoved->lights() : nullptr),
+      lights_(emitters_.scene(), unmoved ? &unmoved->lights() : nullptr, DrawFaces::kByArea),
       size_(bounds_of(unmoved_).diagonal()),
       far_(0.5 * size_ + length(value(unmoved_.camera.origin) - bounds_of(unmoved_).center())) {}
 

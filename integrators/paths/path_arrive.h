@@ -70,7 +70,7 @@ inline Rgb<S> PathTracer<S, Visitor>::emitted(const Walk& walk) const {
   if (detail::stays_black(radiance)) return radiance;
   // A face around an edge that is met at distance 0 is never drawn by light sampling.
   if (std::isinf(walk.pdf)) return radiance;
-  const LightView view{walk.wo, distance, surface.n_g};
+  const LightView view{walk.wo, distance, surface.n_g, surface.face.face};
   const double other = distance > 0 ? c_.lights.pdf(walk.lights, surface.face.shape, view) : 0;
   return radiance * mis_weight(walk.pdf, light_pdf(walk, other));
 }

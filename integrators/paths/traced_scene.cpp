@@ -22,7 +22,7 @@ TracedScene::TracedScene(const Scene& scene, int threads, const Options& options
         tracer_seconds_ = watch.seconds();
         return tracer;
       }()),
-      lights_(scene),
+      lights_(scene, nullptr, options.of_differences ? DrawFaces::kByArea : DrawFaces::kByLight),
       closed_(options.closed ? std::make_unique<ClosedLight>(scene, threads) : nullptr),
       viewpoints_(options.edges ? std::make_unique<Viewpoints>(scene) : nullptr),
       mirrored_(options.closed

@@ -15,7 +15,9 @@ bool is_glossy(const Scene& scene);
 // before it moves. The scene must outlive it.
 struct PathChoices {
   explicit PathChoices(const Scene& scene)
-      : unmoved(scene), lights(scene), mirrored(MirroredLight::make(scene, lights)) {}
+      : unmoved(scene),
+        lights(scene, nullptr, DrawFaces::kByArea),
+        mirrored(MirroredLight::make(scene, lights)) {}
   // The faces that overlap, found once for all scenes whose faces and camera are where the unmoved
   // one's are; null for others. Not for use from several threads at once.
   std::shared_ptr<const CoincidentFaces> faces_of(const Scene& moved, int threads);

@@ -1,7 +1,7 @@
 // Area lights: the front of every face of a shape emits.
 
-#include "limn/core/discrete_distribution.h"
 #include "limn/core/surface_point.h"
+#include "src/light/face_groups.h"
 #include "src/light/types.h"
 
 namespace limn {
@@ -9,17 +9,12 @@ namespace {
 
 class AreaLight final : public Light {
  public:
-  AreaLight(const Scene& scene, ShapeId id) : shape_(scene.shape(id)), id_(id) {
-    for (uint32_t f = 0; f < shape_.mesh.faces.size(); ++f) {
-      const auto c = face_corners<double>(shape_.mesh, FaceId(f));
-      faces_.add(0.5 * length(cross(c[1] - c[0], c[2] - c[0])));
-    }
-    inverse_area_ = 1 / faces_.sum();
-  }
+  AreaLight(const Scene& scene, ShapeId id, DrawFaces draw)
+      : shape_(scene.shape(id)), id_(id), faces_(shape_.mesh, draw) {}
 
   std::optional<LightSample> sample(const Vec3d& p, double probability,
                                     const LightNumbers& u) const override {
-    const FaceId face(static_cast<uint32_t>(faces_.sample(u[0]).index));
+    const auto [face, of_area] = faces_.draw(p, u[0]);
     const double root = std::sqrt(u[1]);
     const double b2 = root * u[2];
     const auto c = face_corners<double>(shape_.mesh, face);
@@ -31,14 +26,14 @@ class AreaLight final : public Light {
     const double facing = -dot(n, wo);
     if (!(facing > 0)) return {};
     // Equal to `pdf`, without normalising the normal.
-    const double density = distance * distance * inverse_area_ * length(n) * probability / facing;
+    const double density = distance * distance * of_area * length(n) * probability / facing;
     if (!(density > 0)) return {};
     return std::optional<LightSample>(std::in_place, wo, distance, density, FaceRef{id_, face},
                                       this);
   }
-  double pdf(const LightView& view, double probability) const override {
+  double pdf(const Vec3d& p, const LightView& view, double probability) const override {
     const double cosine = std::fabs(dot(view.n_g, view.wo));
-    return view.distance * view.distance * inverse_area_ * probability / cosine;
+    return view.distance * view.distance * faces_.density(p, view.face) * probability / cosine;
   }
 
   Rgb<double> radiance(const Vec3<double>&) const override { return value(shape_.radiance); }
@@ -54,14 +49,13 @@ class AreaLight final : public Light {
  private:
   const Shape& shape_;
   ShapeId id_;
-  DiscreteDistribution faces_;  // by area
-  double inverse_area_;
+  FaceGroups faces_;
 };
 
 }  // namespace
 
-std::unique_ptr<Light> make_area_light(const Scene& scene, ShapeId shape) {
-  return std::make_unique<AreaLight>(scene, shape);
+std::unique_ptr<Light> make_area_light(const Scene& scene, ShapeId shape, DrawFaces draw) {
+  return std::make_unique<AreaLight>(scene, shape, draw);
 }
 
 void read_area(Properties& properties, Scene&, Shape* shape) {

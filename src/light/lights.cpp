@@ -36,11 +36,12 @@ std::optional<LightSample> Environment::light_sample(const Drawn& drawn, double 
                      drawn.place};
 }
 
-Lights::Lights(const Scene& scene, const Lights* chosen_by)
+Lights::Lights(const Scene& scene, const Lights* chosen_by, DrawFaces draw)
     : of_shape_(scene.shapes.size()), environment_(scene.environment.get()), chosen_by_(chosen_by) {
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
     if (!scene.shapes[s].is_emitter) continue;
-    area_lights_.push_back(make_area_light(scene, ShapeId(s)));
+    area_lights_.push_back(
+        make_area_light(scene, ShapeId(s), chosen_by_ ? DrawFaces::kByArea : draw));
     of_shape_[s] = all_.size();
     all_.push_back(area_lights_.back().get());
   }

@@ -145,8 +145,8 @@ FAULTS = [
           "test_regions", "MirroredLight.*"),
 
     Fault("MIS", "density of an area light x 1.5", "src/light/area.cpp",
-          "return view.distance * view.distance * inverse_area_ * probability / cosine;",
-          "return 1.5 * view.distance * view.distance * inverse_area_ * probability / cosine;",
+          "return view.distance * view.distance * faces_.density(p, view.face) * probability / cosine;",
+          "return 1.5 * view.distance * view.distance * faces_.density(p, view.face) * probability / cosine;",
           "test_lights"),
     Fault("MIS", "density of a map x 1.1", "src/light/map_density.cpp",
           "return mix(mix(c[0], c[1], along), mix(c[2], c[3], along), down) *",

@@ -119,7 +119,7 @@ void expect_draws_of_densities(const Scene& scene, size_t lamps) {
                              ? lights.pdf(place, ShapeId(static_cast<uint32_t>(which)), lamp)
                              : lights.pdf_environment(place, sample->wo);
       EXPECT_DOUBLE_EQ(sample->pdf, pdf);
-      expected[which] = pdf / lights.all()[which]->pdf(lamp, 1);
+      expected[which] = pdf / lights.all()[which]->pdf(place.p, lamp, 1);
     }
   }
   EXPECT_NEAR(std::accumulate(expected.begin(), expected.end(), 0.0), 1, 1e-12);
@@ -362,7 +362,7 @@ TEST(Lights, AreDrawnByWhatLargeLampsSend) {
   for (const double d : {3.0, 1.0, 0.1, 0.001}) {
     const Lights::Point place = lights.at({0, 3 - d, 0});
     const double chance =
-        lights.pdf_environment(place, {0, 1, 0}) / lights.all()[1]->pdf({{0, 1, 0}, 1, {}}, 1);
+        lights.pdf_environment(place, {0, 1, 0}) / lights.all()[1]->pdf({}, {{0, 1, 0}, 1, {}}, 1);
     const double lamp = 20 / (d * d + 1), sky = 1;
     EXPECT_NEAR(chance, 0.125 + 0.75 * sky / (lamp + sky), 1e-6) << d;
   }
@@ -377,7 +377,7 @@ TEST(Lights, OfNoDensityDrawNothing) {
   mesh.positions[face[0]] = {-8, 0, 0};
   mesh.positions[face[1]] = {0, 0, 0};
   mesh.positions[face[2]] = {0, 0, -8};
-  const std::unique_ptr<Light> lamp = make_area_light(scene, ShapeId(0));
+  const std::unique_ptr<Light> lamp = make_area_light(scene, ShapeId(0), DrawFaces::kByArea);
   const LightNumbers corner{};  // draws the second one
   const auto near = lamp->sample({0, 1e-150, 0}, 1, corner);
   ASSERT_TRUE(near);

@@ -92,7 +92,7 @@ class Environment : public Light, public TexelMap {
                                     const LightNumbers& u) const final {
     return light_sample(sample_direction(u[0], u[1]), probability);
   }
-  double pdf(const LightView& view, double probability) const final {
+  double pdf(const Vec3d&, const LightView& view, double probability) const final {
     return pdf_solid_angle(view.wo) * probability;
   }
 };

@@ -39,9 +39,10 @@ struct LightSample {
 
 // A light as hit by a ray.
 struct LightView {
-  Vec3d wo;         // unit, of the ray
-  double distance;  // along the ray; infinite for an environment
-  Vec3d n_g;        // unit geometric normal at the hit; unused for an environment
+  Vec3d wo;          // unit, of the ray
+  double distance;   // along the ray; infinite for an environment
+  Vec3d n_g;         // unit geometric normal at the hit; unused for an environment
+  FaceId face = {};  // at the hit; unused for an environment, and if faces are drawn by area
 };
 
 // The uniform numbers in [0, 1) that one light sample consumes.
@@ -55,8 +56,8 @@ class Light {
   // sample of value zero) if the sampled point does not face p, or its density underflows.
   virtual std::optional<LightSample> sample(const Vec3d& p, double probability,
                                             const LightNumbers& u) const = 0;
-  // The density [1/sr] of `sample` for this view; 0 for a delta light.
-  virtual double pdf(const LightView& view, double probability) const = 0;
+  // The density [1/sr] of `sample` for this view from p; 0 for a delta light.
+  virtual double pdf(const Vec3d& p, const LightView& view, double probability) const = 0;
 
   // Radiance arriving from the unit direction wo at points that the light illuminates; zero for a
   // delta light.
@@ -130,7 +131,7 @@ class DeltaLight : public Light {
 
   std::optional<LightSample> sample(const Vec3d& p, double probability,
                                     const LightNumbers& u) const final;
-  double pdf(const LightView&, double) const final { return 0; }
+  double pdf(const Vec3d&, const LightView&, double) const final { return 0; }
   Rgb<double> radiance(const Vec3<double>&) const final { return {}; }
   Rgb<Dual> radiance(const Vec3<Dual>&) const final { return {}; }
   const DeltaLight* delta() const final { return this; }
@@ -140,7 +141,13 @@ class DeltaLight : public Light {
 // InputError for an unknown type (lists the known ones), a wrong place, or bad values.
 void read_light(Properties& properties, Scene& scene, Shape* shape);
 
-// The area light of an emitting shape; samples uniformly in area. The scene must outlive it.
-std::unique_ptr<Light> make_area_light(const Scene& scene, ShapeId shape);
+// How area lights draw their faces.
+enum class DrawFaces {
+  kByLight,  // mostly by what they send to the point, unoccluded
+  kByArea,
+};
+
+// The area light of an emitting shape. The scene must outlive it.
+std::unique_ptr<Light> make_area_light(const Scene& scene, ShapeId shape, DrawFaces draw);
 
 }  // namespace limn

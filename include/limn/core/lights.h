@@ -17,11 +17,12 @@ namespace limn {
 // delta lights as in the file. The scene must outlive it.
 class Lights {
  public:
-  // chosen_by: lights of the unperturbed scene whose probabilities are used instead; null: its own.
-  // Finite differences use the same choice in both scenes. Otherwise a different light would be
-  // chosen in a few samples, and their large contributions, divided by the step, would carry all of
-  // that derivative (high variance). They must outlive it.
-  explicit Lights(const Scene& scene, const Lights* chosen_by = nullptr);
+  // chosen_by: lights of the unperturbed scene whose probabilities are used instead, and faces are
+  // drawn by area; null: its own. Finite differences use the same choice in both scenes. Otherwise
+  // another light or face would be chosen in a few samples, whose large contributions, divided by
+  // the step, would carry all of that derivative (high variance). They must outlive it.
+  explicit Lights(const Scene& scene, const Lights* chosen_by = nullptr,
+                  DrawFaces draw = DrawFaces::kByLight);
 
   bool empty() const { return all_.empty(); }
   // True if any shape emits.
@@ -58,7 +59,7 @@ class Lights {
   // leaves the scene, on the environment (which must exist).
   double pdf(const Point& place, ShapeId shape, const LightView& view) const {
     const size_t light = of_shape_[shape.index()];
-    return all_[light]->pdf(view, probability(place, light));
+    return all_[light]->pdf(place.p, view, probability(place, light));
   }
   double pdf_environment(const Point& place, const Vec3d& wo) const {
     return environment_->pdf_solid_angle(wo) * probability(place, area_lights_.size());
