@@ -228,15 +228,6 @@ Vec3d origin_of(const Scene& scene) {
   return origin;
 }
 
-// Above a face by this much almost no ray that leaves it meets it: of 1.2 million in a Cornell box
-// 91, of 875,000 without. Four roundings of the largest coordinate.
-double clearance_of(const Scene& scene, const Vec3d& origin) {
-  if (scene.shapes.empty()) return 0;
-  const Bounds bounds = bounds_of(scene);
-  const Vec3d lower = bounds.lower - origin, upper = bounds.upper - origin;
-  return 0x1p-22 * largest_coordinate(std::array{lower, upper});
-}
-
 // Coordinates for a mesh of slivers that lie askew; none for other meshes.
 std::optional<OrientedBox> frame_of(const Mesh& mesh) {
   constexpr size_t kMost = 4096;  // faces that tell slivers; not tuned
@@ -285,8 +276,7 @@ class EmbreeTracer final : public RayTracer {
         overlaps_(faces_->overlaps),
         settles_(!copies_.empty() || !overlaps_.empty()),
         origin_(origin_of(scene)),
-        reach_(kReach * bounds_of(scene).diagonal()),
-        clearance_(clearance_of(scene, origin_)) {
+        reach_(kReach * bounds_of(scene).diagonal()) {
     // Without a number of threads: Embree would limit all of TBB to the machine's cores by it.
     device_.reset(rtcNewDevice(nullptr));
     if (!device_) throw InputError("Embree cannot start on this machine");
@@ -360,11 +350,15 @@ class EmbreeTracer final : public RayTracer {
       queries = queries.subspan(next.size());
     }
   }
-  // What is subtracted from where the ray starts: origin_, and the clearance above a face.
+  // The origin of Embree's coordinates for a ray, so moved that it starts above its face by four
+  // roundings of its own coordinates: then almost no ray meets that face. By the scene's size, rays
+  // would start beyond what is close to them in large scenes.
   Vec3d origin_for(const RayQuery& query) const {
     if (!query.ray.start.shape.valid()) return origin_;
     const Vec3d& n = query.normal;
-    return origin_ - n * std::copysign(clearance_, dot(n, query.ray.direction));
+    const Vec3d from = query.ray.origin - origin_;
+    const double largest = std::max({std::fabs(from.x), std::fabs(from.y), std::fabs(from.z)});
+    return origin_ - n * std::copysign(0x1p-22 * largest, dot(n, query.ray.direction));
   }
   // Of rays that cannot be traced: what is valid is 0.
   template <class Rays>

@@ -163,6 +163,31 @@ TEST_P(RayTracers, TraceTogetherAsAlone) {
   EXPECT_LE(different, 3);  // by rounding, where faces meet
 }
 
+// A face close above another hides what is above it, also where a third is far away.
+TEST(RaysTogether, StartBelowWhatIsCloseInLargeScenes) {
+  Scene scene;
+  scene.shapes.emplace_back().mesh = make_mesh({{0, 0, 0}, {1, 0, 3}, {2, 0, 0}}, {{0, 1, 2}});
+  scene.shapes.emplace_back().mesh =
+      make_mesh({{0.9f, 0.001f, 0.9f}, {1, 0.001f, 1.1f}, {1.1f, 0.001f, 0.9f}}, {{0, 1, 2}});
+  scene.shapes.emplace_back().mesh =
+      make_mesh({{1e5f, 0, 0}, {1e5f, 1, 0}, {-1e5f, 0, 1}}, {{0, 1, 2}});
+  const auto embree = make_embree_tracer(scene, 1);
+  std::vector<RayQuery> queries(11);
+  for (RayQuery& query : queries) {
+    query.ray = {{1, 0, 1}, {0, 1, 0}};
+    query.ray.start = {ShapeId(0), FaceId(0)};
+    query.normal = {0, 1, 0};
+  }
+  embree->closest_each(queries);
+  for (const RayQuery& query : queries) {
+    ASSERT_TRUE(query.found);
+    EXPECT_EQ(query.hit.face, (FaceRef{ShapeId(1), FaceId(0)}));
+    EXPECT_NEAR(query.hit.t, 0.001, 1e-6);
+  }
+  embree->occluded_each(queries);
+  for (const RayQuery& query : queries) EXPECT_TRUE(query.found);
+}
+
 // The largest puts coordinates near kLargestCoordinate.
 INSTANTIATE_TEST_SUITE_P(, RayTracers, testing::Values(1e-3, 1.0, 1e4, 5e11), [](const auto& test) {
   return test.param < 1 ? "small" : test.param < 2 ? "one" : test.param < 1e5 ? "large" : "largest";
