@@ -360,7 +360,7 @@ class EmbreeTracer final : public RayTracer {
     const double largest = std::max({std::fabs(from.x), std::fabs(from.y), std::fabs(from.z)});
     return origin_ - n * std::copysign(0x1p-22 * largest, dot(n, query.ray.direction));
   }
-  // Of rays that cannot be traced: what is valid is 0.
+  // Writes the rays of a packet. Sets valid to 0 for rays that cannot be traced.
   template <class Rays>
   void put(std::span<RayQuery> queries, int* valid, Rays& rays) const {
     for (size_t i = 0; i < kPacket; ++i) {
@@ -383,8 +383,8 @@ class EmbreeTracer final : public RayTracer {
       rays.flags[i] = 0;
     }
   }
-  // What the ray meets without a filter. Hardly any meets what it ignores: those that do are traced
-  // again.
+  // Takes the hit that a ray has without a filter. A ray that meets a face that it ignores, which
+  // is rare, is traced again.
   void take(RayQuery& query, FaceRef face, double t) const {
     query.found = face.shape.valid();
     if (query.found) {

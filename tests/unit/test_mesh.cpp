@@ -197,7 +197,7 @@ TEST(Normals, StayWhereAllMovesAsOne) {
   EXPECT_NE(mesh.normal_tangents[8].x[0], 0);
 }
 
-// Of faces with corners of their own normals turn nowhere.
+// Faces that share no vertices have normals that do not vary.
 TEST(Normals, AreIdleWhereTheyAreThoseOfFaces) {
   Mesh apart = make_mesh({{0, 0, 0}, {1, 0, 0}, {0, 1, 0.5}, {2, 0, 0}, {2, 2, 0}, {2, 0, 1}},
                          {{0, 1, 2}, {3, 4, 5}});

@@ -64,9 +64,9 @@ class RayTracer {
   // hit. Thread-safe. Throws UntraceableRay unless is_traceable(ray).
   virtual bool closest(const Ray& ray, Hit& hit) const = 0;
   virtual bool occluded(const Ray& ray) const = 0;
-  // The same of several rays, in less time where they are alike. A ray's result is independent of
-  // the others. It starts above the face ray.start by a few roundings of positions.
-  static constexpr size_t kTogether = 8;  // in no other number are they faster
+  // The same for several rays, which take less time together. The result of a ray does not depend
+  // on the others. A ray starts above the face ray.start by a few roundings of its origin.
+  static constexpr size_t kTogether = 8;
   virtual void closest_each(std::span<RayQuery> queries) const;
   virtual void occluded_each(std::span<RayQuery> queries) const;
   // True if two faces are duplicates or overlap in a plane
