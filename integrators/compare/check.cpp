@@ -6,7 +6,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <numeric>
 
 #include "integrators/compare/check_scores.h"
 #include "integrators/compare/check_step.h"
@@ -432,25 +434,28 @@ class Checker {
     return at_kink;
   }
 
-  // Sets the suspicions, and the suspect among them, from the second run.
+  // Sets the suspicions, and the suspects among them, from the second run.
   void suspect_terms(const Residual& residual, const Runs& runs, CheckResult& result) const {
     const std::vector<TermRun>& terms = runs.gradient.terms;
     // A term that was left out may be the one that is missing.
     std::optional<GradientResult> others;
-    double largest = -1;
     for (size_t t = 0; t < terms.size(); ++t) {
       if (!terms[t].computed && !others) others = other_terms(runs.gradient);
       const GradientResult& from = terms[t].computed ? runs.gradient : *others;
       const Suspicion suspicion = suspect(residual, from.parameters[0].term_blocks[t]);
       result.suspicions.push_back(suspicion);
-      if (std::fabs(suspicion.z) > largest) {
-        largest = std::fabs(suspicion.z);
-        result.suspect = terms[t].name;
-      }
     }
+    std::vector<size_t> order(terms.size());
+    std::iota(order.begin(), order.end(), size_t{0});
+    const auto squared = [&](size_t t) { return result.suspicions[t].z * result.suspicions[t].z; };
+    std::ranges::stable_sort(order, std::greater{}, squared);
     // A defect that is no part of any term's image must not be blamed on the nearest.
     const double level = share_of_level(kCheckStageLevel, terms.size());
-    if (normal_p_value(largest) >= level) result.suspect.clear();
+    if (normal_p_value(std::sqrt(squared(order[0]))) >= level) return;
+    for (const size_t t : order) {
+      if (squared(order[0]) - squared(t) > 2 * std::log(20)) break;
+      result.suspects.push_back(terms[t].name);
+    }
   }
 
   static Suspicion suspect(const Residual& residual, const Moments& term) {

@@ -84,7 +84,7 @@ TEST_P(MissingTerm, IsNoticedAndNamed) {
   const CheckResult r =
       run_check(scene, "ball.translate.y", 1024, terms, with_regions ? "silhouettes" : "forest");
   EXPECT_EQ(r.verdict, Verdict::kDisagree);
-  EXPECT_EQ(r.suspect, missing);
+  EXPECT_EQ(suspected(r), missing);
   const Suspicion& suspicion = r.suspicions[r.gradient.term(missing)];
   EXPECT_NEAR(suspicion.factor, 1, 6 / std::fabs(suspicion.z));
   fmt::print("  {} missing: {:.3f} of it found, z = {:.1f}\n", missing, suspicion.factor,

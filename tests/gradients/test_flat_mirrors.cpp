@@ -104,7 +104,7 @@ TEST_P(FlatGlassInView, Agrees) {
   const TempFiles files;
   const CheckResult r = run_check(behind_slab(files), GetParam(), 512);
   EXPECT_GT(r.windows.count, 0);
-  EXPECT_NE(r.verdict, Verdict::kDisagree) << "suspect " << r.suspect;
+  EXPECT_NE(r.verdict, Verdict::kDisagree) << "suspect " << suspected(r);
   EXPECT_FALSE(r.gradient.incomplete);
 }
 

@@ -52,7 +52,7 @@ TEST_P(SharpShadows, Agree) {
   const TempFiles files;
   const CheckResult r =
       run_check(shadow_scene(files, std::string(kBulb) + kTorch + kSun), GetParam(), 256);
-  EXPECT_NE(r.verdict, Verdict::kDisagree) << "suspect: " << r.suspect;
+  EXPECT_NE(r.verdict, Verdict::kDisagree) << "suspect: " << suspected(r);
 }
 
 INSTANTIATE_TEST_SUITE_P(, SharpShadows,
@@ -92,7 +92,7 @@ TEST(SharpShadowsMissing, AreNoticedAndNamed) {
   const CheckResult r =
       run_check(scene, "ball.translate.x", 256, {"interior", "camera", "boundary"});
   EXPECT_EQ(r.verdict, Verdict::kDisagree);
-  EXPECT_EQ(r.suspect, "shadow");
+  EXPECT_EQ(suspected(r), "shadow");
 }
 
 }  // namespace

@@ -60,7 +60,7 @@ std::string name_of(const testing::TestParamInfo<std::string>& test) {
 void expect_complete_agreement(const Scene& scene, const std::string& parameter) {
   const CheckResult r = run_check(scene, parameter, 256);
   EXPECT_GT(r.windows.count, 0);
-  EXPECT_NE(r.verdict, Verdict::kDisagree) << "suspect " << r.suspect;
+  EXPECT_NE(r.verdict, Verdict::kDisagree) << "suspect " << suspected(r);
   EXPECT_FALSE(r.gradient.incomplete);
 }
 

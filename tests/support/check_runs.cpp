@@ -2,11 +2,16 @@
 #include "support/check_runs.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 namespace limn {
+
+std::string suspected(const CheckResult& result) {
+  return fmt::format("{}", fmt::join(result.suspects, " or "));
+}
 
 CheckResult run_check(const Scene& scene, const std::string& parameter, int spp,
                       const std::vector<std::string>& terms, const Method& method) {
@@ -33,7 +38,7 @@ CheckResult run_check(const Scene& scene, const std::string& parameter, int spp,
 void expect_agreement(const Scene& scene, const std::string& parameter, int spp) {
   const CheckResult r = run_check(scene, parameter, spp);
   EXPECT_GT(r.windows.count, 0) << parameter;
-  EXPECT_NE(r.verdict, Verdict::kDisagree) << parameter << ": suspect " << r.suspect;
+  EXPECT_NE(r.verdict, Verdict::kDisagree) << parameter << ": suspect " << suspected(r);
 }
 
 std::vector<ReverseCheck> expect_modes_agree(const Scene& scene, int spp,

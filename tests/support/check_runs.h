@@ -9,6 +9,8 @@
 
 namespace limn {
 
+// "shadow", or "interior or boundary" where two terms explain what is wrong.
+std::string suspected(const CheckResult& result);
 // Uses blocks of four pixels; expects finite results.
 CheckResult run_check(const Scene& scene, const std::string& parameter, int spp,
                       const std::vector<std::string>& terms = {},

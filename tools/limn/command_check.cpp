@@ -51,13 +51,17 @@ std::string power_text(const CheckResult& r) {
 }
 
 void print_verdict(const CheckResult& r, double seconds) {
-  if (r.verdict == Verdict::kDisagree && r.suspect.empty()) {
+  if (r.verdict == Verdict::kDisagree && r.suspects.empty()) {
     fmt::print("  DISAGREE at the level {:.0e}: what is wrong looks like no single term\n",
                kCheckLevel);
   } else if (r.verdict == Verdict::kDisagree) {
-    fmt::print("  DISAGREE at the level {:.0e}: suspect the {} term", kCheckLevel, r.suspect);
-    const Suspicion& s = r.suspicions[r.gradient.term(r.suspect)];
-    fmt::print(": the differences hold {:.3g} times of it (z = {:.1f})\n", 1 + s.factor, s.z);
+    fmt::print("  DISAGREE at the level {:.0e}: suspect ", kCheckLevel);
+    for (size_t k = 0; k < r.suspects.size(); ++k) {
+      const Suspicion& s = r.suspicions[r.gradient.term(r.suspects[k])];
+      fmt::print("{}the {} term: the differences hold {:.3g} times of it (z = {:.1f})",
+                 k == 0 ? "" : ", or ", r.suspects[k], 1 + s.factor, s.z);
+    }
+    fmt::print("\n");
   } else if (r.verdict == Verdict::kAgree && r.is_zero()) {
     fmt::print("  agree: both are zero, without noise\n");
   } else if (r.verdict == Verdict::kAgree) {
@@ -159,7 +163,7 @@ json figures_json(const std::string& name, const CheckResult& r) {
     report["second_run"] = {
         {"spp", r.confirmation->spp}, {"step", r.confirmation->step}, {"p", r.confirmation->p}};
   }
-  if (r.verdict == Verdict::kDisagree) report["suspect"] = r.suspect;
+  if (r.verdict == Verdict::kDisagree) report["suspects"] = r.suspects;
   return report;
 }
 

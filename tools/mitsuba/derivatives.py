@@ -152,7 +152,7 @@ def forward_result(report):
     if verdict == "cannot tell" and not report["bends"] and visible and visible <= 1:
         verdict = COARSELY
     keys = ("spp", "within", "p", "gradient_sum", "gradient_sum_stderr", "difference_sum",
-            "difference_sum_stderr", "smallest_at", "suspect", "bends", "step")
+            "difference_sum_stderr", "smallest_at", "suspects", "bends", "step")
     growth = max(1, within / WANTED)**TIME_POWER if within is not None else math.inf
     return {"growth": math.inf if report["bends"] else growth,
             **{key: report[key] for key in keys if key in report}, "verdict": verdict}

@@ -77,8 +77,9 @@ void bind_result(nb::module_& m) {
       .def_prop_ro("p", field(&CheckResult::p),
                    "Of the first run: windows, image and terms together.")
       .def_prop_ro("found", field(&CheckResult::found), "Where the first run's p is smallest.")
-      .def_prop_ro("suspect", field(&CheckResult::suspect),
-                   "The term that the residual looks like most; \"\" if none is suspected.")
+      .def_prop_ro("suspects", field(&CheckResult::suspects),
+                   "The terms that the residual looks like, most likely first; empty if none is "
+                   "suspected.")
       .def_prop_ro("step", field(&CheckResult::step),
                    "Of the differences, in the parameter's unit.")
       .def_prop_ro("needed_spp", field(&CheckResult::needed_spp),

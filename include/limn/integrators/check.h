@@ -101,8 +101,10 @@ struct CheckResult {
   // light. The gradient is that of one side, and the verdict kCannotTell.
   bool bends = false;
   std::vector<Suspicion> suspicions;  // of each term of the gradient, if they disagree
-  std::string suspect;                // the term with the largest |z| of these; ""
-  GradientResult gradient;            // of the last run
+  // The term with the largest |z| of these, and those that explain what is wrong almost as well, a
+  // likelihood of a twentieth or more, in this order; none where it looks like no term.
+  std::vector<std::string> suspects;
+  GradientResult gradient;  // of the last run
   DifferenceResult differences;
 };
 
