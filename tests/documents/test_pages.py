@@ -81,6 +81,13 @@ class Pages(unittest.TestCase):
                     with self.subTest(page=name, line=number):
                         self.assertLessEqual(len(line), WIDTH)
 
+    # Words about them are comments of the shell.
+    def test_lines_of_commands_run_as_printed(self):
+        for name, text in pages():
+            for line in re.findall(r"^ {4}(?:\$ )?((?:tools|build)/.*)$", text, re.MULTILINE):
+                with self.subTest(page=name, line=line):
+                    self.assertIsNone(re.search(r"\S {2,}(?!#)\S", line))
+
     def test_pages_are_short(self):
         total = 0
         for name, text in pages():
