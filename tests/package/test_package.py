@@ -75,6 +75,16 @@ class Package(unittest.TestCase):
                               stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
         self.assertEqual(done.returncode, 0, done.stdout)
 
+    def test_all_missing_libraries_are_named_at_once(self):
+        done = subprocess.run(
+            [CMAKE, "-S", ROOT, "-B", os.path.join(WORK, "missing"), "-G", "Ninja",
+             "-DCMAKE_DISABLE_FIND_PACKAGE_PNG=ON", "-DCMAKE_DISABLE_FIND_PACKAGE_CLI11=ON",
+             "-DCLP_LIBRARY=OFF"],
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        self.assertNotEqual(done.returncode, 0)
+        said = " ".join(done.stdout.split())
+        self.assertIn("not found: PNG, CLI11, CLP_LIBRARY. tools/packages installs", said)
+
     # Files of the package name no folder of the source or of the build.
     def test_package_can_be_moved(self):
         for folder, _, names in os.walk(os.path.join(PREFIX, "lib")):
