@@ -29,6 +29,17 @@ bool is_closed(const Mesh& mesh) {
   });
 }
 
+// Whether x, in the plane of a face with this normal, is in it, and far from its sides. Most are.
+bool is_deep(const std::array<Vec3d, 3>& corners, const Vec3d& n, const Vec3d& x, double far) {
+  const double squared = far * far * dot(n, n);
+  for (int k = 0; k < 3; ++k) {
+    const Vec3d u = corners[(k + 1) % 3] - corners[k];
+    const double side = dot(cross(n, u), x - corners[k]);  // its distance times |n| |u|
+    if (!(side > 0) || !(side * side > squared * dot(u, u))) return false;
+  }
+  return true;
+}
+
 bool before(const BlurHit& a, const BlurHit& b) {
   if (a.t != b.t) return a.t < b.t;
   if (a.face.shape != b.face.shape) return a.face.shape < b.face.shape;
@@ -97,9 +108,14 @@ std::optional<BlurHit> BlurFaces::meet(const Ray& ray, FaceRef face) const {
   if (facing == 0 || (facing > 0 && meshes_[face.shape.index()].front_only)) return {};
   const double t = dot(n, corners[0] - ray.origin) / facing;
   if (!(t > ray.t_min) || !(t < ray.t_max)) return {};
-  const double distance = distance_to_sides(corners, ray.origin + ray.direction * t);
-  if (!(distance > -reach_) || is_beside_start(ray, face, corners)) return {};
-  const double opacity = blur_opacity(distance, blur_.sigma);
+  const Vec3d x = ray.origin + ray.direction * t;
+  double opacity = 1;
+  if (!is_deep(corners, n, x, reach_)) {
+    const double distance = distance_to_sides(corners, x);
+    if (!(distance > -reach_)) return {};
+    opacity = blur_opacity(distance, blur_.sigma);
+  }
+  if (is_beside_start(ray, face, corners)) return {};
   if (!(opacity > 0)) return {};
   return BlurHit{face, t, opacity, facing < 0};
 }
@@ -119,12 +135,13 @@ void BlurFaces::settle(const Ray& ray, std::vector<BlurHit>& hits) const {
   const Mesh& mesh = scene_.shape(face.shape).mesh;
   const MeshFaces& own = meshes_[face.shape.index()];
   const size_t count = hits.size();
+  Ray behind = ray;
+  behind.t_min = std::max(ray.t_min, last);
   for (const uint32_t v : mesh.face(face.face)) {
     for (uint32_t i = own.first[mesh.weld[v]]; i < own.first[mesh.weld[v] + 1]; ++i) {
       const FaceRef other{face.shape, FaceId(own.around[i])};
       if (other == face || !has_area(mesh, mesh.face(other.face))) continue;
-      const auto hit = meet(ray, other);
-      if (hit && hit->t > last) hits.push_back(*hit);
+      if (const auto hit = meet(behind, other)) hits.push_back(*hit);
     }
   }
   if (hits.size() > count) bring_in_order();
