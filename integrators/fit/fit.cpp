@@ -152,6 +152,8 @@ void Fit::Impl::check_shapes() {
       if (!a.is_array() || !shape.valid()) continue;
       for (const FitParameter& b : parameters_) {
         if (&a == &b || b.shape(v) != shape) continue;
+        // Velocities leave the vertices of the reference time where they are.
+        if (!b.is_array() && !b.in_view(v)->value(views[v].scene).empty()) continue;
         throw InputError({views[v].scene.file},
                          fmt::format("\"{}\" and \"{}\" move the same vertices: fit one of them",
                                      a.name(), b.name()));

@@ -3,7 +3,8 @@
 // adjoint is that of the sharp image: with that of a blurred one, which is brighter than the
 // target, objects leave the view (scenes/regularised). So a step is no gradient of a loss, but its
 // mean is 0 where the image meets the target, whatever sigma is.
-// The step is the product of derivative images and adjoint: numbers are few, arrays are refused.
+// The step is the product of derivative images and adjoint, and four numbers take a pass: arrays
+// must be small.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -21,6 +22,8 @@
 
 namespace limn {
 namespace {
+
+constexpr size_t kMostNumbers = 1024;  // of an array; not tuned
 
 // Blurred faces have no interpolated normals.
 Scene flat(const Scene& scene) {
@@ -55,18 +58,13 @@ void Fit::Impl::check_blur() const {
     throw InputError("fits that begin blurred need random points and another optimiser than lbfgs");
   }
   for (const FitParameter& p : parameters_) {
-    if (!p.is_array() && !p.is_map()) continue;
+    if (p.size() <= kMostNumbers) continue;
     throw InputError(fmt::format(
-        "\"{}\" is an array: a fit that begins blurred takes scalars and colours", p.name()));
+        "\"{}\" is an array of {} numbers: a fit that begins blurred takes at most {}, as it "
+        "derives image after image",
+        p.name(), p.size(), kMostNumbers));
   }
-  for (size_t v = 0; v < views.size(); ++v) {
-    std::vector<Parameter> own;
-    for (const FitParameter& p : parameters_) {
-      if (p.in_view(v)) own.push_back(*p.in_view(v));
-    }
-    check_still(views[v].scene, "a fit that begins blurred", own);
-    check_blurred(flat(views[v].scene));
-  }
+  for (const FitView& view : views) check_blurred(flat(view.scene));
 }
 
 Blur Fit::Impl::blur() const {
@@ -80,31 +78,35 @@ Blur Fit::Impl::blur() const {
 
 bool Fit::Impl::add_blurred(size_t view, const Image& adjoint, const RunSettings& settings,
                             std::vector<std::vector<double>>& gradients) const {
-  std::vector<Parameter> list;                // channels of colours one by one
+  std::vector<BlurredNumber> list;            // channels of colours one by one
   std::vector<std::pair<size_t, size_t>> of;  // which parameter of the fit, which of its numbers
+  std::vector<Parameter> own;
   for (size_t i = 0; i < parameters_.size(); ++i) {
     const Parameter* const found = parameters_[i].in_view(view);
     if (!found) continue;
+    own.push_back(*found);
     gradients[i].resize(found->numbers());
     for (size_t c = 0; c < found->numbers(); ++c) {
-      list.push_back(found->colour ? find_parameter(views[view].scene,
-                                                    fmt::format("{}.{}", found->name, "rgb"[c]))
-                                   : *found);
       of.emplace_back(i, c);
+      if (!found->colour) {
+        list.push_back({*found, c});
+        continue;
+      }
+      const std::string channel = fmt::format("{}.{}", found->name, "rgb"[c]);
+      list.push_back({find_parameter(views[view].scene, channel)});
     }
   }
   if (list.empty()) return true;
   const Scene scene = flat(views[view].scene);
-  std::vector<std::unique_ptr<SampleEstimator>> passes;
-  for (size_t k = 0; k < list.size(); k += kLanes) {
-    const auto some = std::span(list).subspan(k).first(std::min<size_t>(kLanes, list.size() - k));
-    passes.push_back(std::make_unique<BlurredEstimator>(scene, resolved(blur(), scene), some,
-                                                        settings.threads, Numbers::kIndependent));
-  }
+  const Blur blur = resolved(this->blur(), scene);
+  const auto passes = blurred_passes(scene, blur, list, settings.threads);
+  const EstimatorsAt at = [&](double u) {
+    return EstimatorsAtTime{{}, blurred_passes(scene, blur, list, settings.threads, u)};
+  };
   int64_t spp = 0;
   NonFinite non_finite;
   std::vector<double> sums(list.size());
-  run_batches(passes, settings, Stopwatch(), [&](const Batch& batch, const auto& done) {
+  const auto take = [&](const Batch& batch, const auto& done) {
     for (size_t k = 0; k < list.size(); ++k) {
       const std::vector<double>& image = done[k / kLanes].images[k % kLanes];
       for (size_t j = 0; j < image.size(); ++j) {
@@ -113,7 +115,8 @@ bool Fit::Impl::add_blurred(size_t view, const Image& adjoint, const RunSettings
     }
     for (const BatchSums& pass : done) non_finite.merge(pass.non_finite);
     spp += batch.count();
-  });
+  };
+  run_batches(passes, settings, Stopwatch(), take, needs_times(scene, own) ? at : EstimatorsAt());
   if (non_finite.count > 0) throw InputError("gradient: " + non_finite.message());
   if (spp < settings.spp) return false;
   for (size_t k = 0; k < list.size(); ++k) {

@@ -3,33 +3,38 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "integrators/paths/blurred_path.h"
 #include "integrators/paths/camera_path.h"
 #include "integrators/paths/path_log.h"
+#include "limn/core/exposure.h"
 
 namespace limn {
 namespace {
 
-std::shared_ptr<const Scene> seeded(const Scene& scene, std::span<const Parameter> parameters) {
-  if (parameters.empty()) return {std::shared_ptr<const Scene>(), &scene};
+std::shared_ptr<const Scene> seeded(const Scene& scene, std::span<const BlurredNumber> derived,
+                                    const std::optional<double>& time) {
+  if (derived.empty() && !time) return {std::shared_ptr<const Scene>(), &scene};
   auto copy = std::make_shared<Scene>(deep_copy(scene));
-  for (size_t k = 0; k < parameters.size(); ++k) {
-    parameters[k].seed(*copy, static_cast<int>(k));
+  for (size_t k = 0; k < derived.size(); ++k) {
+    derived[k].parameter.seed(*copy, static_cast<int>(k), derived[k].component);
   }
+  if (time) set_time(*copy, *time);
   return copy;
 }
 
 }  // namespace
 
 BlurredEstimator::BlurredEstimator(const Scene& scene, const Blur& blur,
-                                   std::span<const Parameter> parameters, int threads,
-                                   Numbers numbers)
-    : scene_((check_blurred(scene), seeded(scene, parameters))),
-      lanes_(static_cast<int>(parameters.size())),
+                                   std::span<const BlurredNumber> derived, int threads,
+                                   Numbers numbers, std::optional<double> time)
+    : scene_((check_blurred(scene), seeded(scene, derived, time))),
+      lanes_(static_cast<int>(derived.size())),
       blurred_(*scene_, blur, threads),
       filter_(scene_->film.filter),
       numbers_(numbers) {
-  for (int k = 0; k < lanes_; ++k) lane_scale_[k] = parameters[k].natural_step;
+  for (int k = 0; k < lanes_; ++k) lane_scale_[k] = derived[k].parameter.natural_step;
 }
 
 BlurredEstimator::BlurredEstimator(const Scene& moved, const BlurredScene& unmoved, int threads,
@@ -76,6 +81,19 @@ void BlurredEstimator::add_pixels(std::span<const KeyedSample> samples, SampleSi
     const CameraView<double> view(scene_->camera);
     for (const KeyedSample& sample : samples) add(sample, view, sink);
   }
+}
+
+std::vector<std::unique_ptr<SampleEstimator>> blurred_passes(const Scene& scene, const Blur& blur,
+                                                             std::span<const BlurredNumber> derived,
+                                                             int threads,
+                                                             std::optional<double> time) {
+  std::vector<std::unique_ptr<SampleEstimator>> passes;
+  for (size_t k = 0; k < derived.size(); k += kLanes) {
+    const auto some = derived.subspan(k).first(std::min<size_t>(kLanes, derived.size() - k));
+    passes.push_back(std::make_unique<BlurredEstimator>(scene, blur, some, threads,
+                                                        Numbers::kIndependent, time));
+  }
+  return passes;
 }
 
 std::string bias_of_blur(const Scene& scene, const Blur& blur) {

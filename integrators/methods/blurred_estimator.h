@@ -1,5 +1,6 @@
 #pragma once
 // Images of a scene of blurred faces, and their derivatives.
+#include <optional>
 #include <span>
 
 #include "integrators/estimates/sample_estimator.h"
@@ -8,12 +9,19 @@
 
 namespace limn {
 
+// A scalar parameter, or one number of an array.
+struct BlurredNumber {
+  Parameter parameter;
+  size_t component = 0;
+};
+
 class BlurredEstimator final : public SampleEstimator {
  public:
-  // parameters: at most kLanes, whose derivatives go to the slot; none: an image alone. The scene
-  // must outlive the estimator. blur: as resolved() has it.
-  BlurredEstimator(const Scene& scene, const Blur& blur, std::span<const Parameter> parameters,
-                   int threads, Numbers numbers);
+  // derived: at most kLanes, whose derivatives go to the slot; none: an image alone. The scene must
+  // outlive the estimator. blur: as resolved() has it. time: of the shutter, see at_time(); none:
+  // the scene is as it is.
+  BlurredEstimator(const Scene& scene, const Blur& blur, std::span<const BlurredNumber> derived,
+                   int threads, Numbers numbers, std::optional<double> time = {});
   // The image of a scene that has moved, by the choices of the one that has not.
   BlurredEstimator(const Scene& moved, const BlurredScene& unmoved, int threads, Numbers numbers);
 
@@ -36,6 +44,12 @@ class BlurredEstimator final : public SampleEstimator {
   FilterTable filter_;
   Numbers numbers_;
 };
+
+// One for every kLanes of `derived`; the same at a time of the shutter, where something moves.
+std::vector<std::unique_ptr<SampleEstimator>> blurred_passes(const Scene& scene, const Blur& blur,
+                                                             std::span<const BlurredNumber> derived,
+                                                             int threads,
+                                                             std::optional<double> time = {});
 
 // What a reader of images or derivatives of blurred faces must know.
 std::string bias_of_blur(const Scene& scene, const Blur& blur);

@@ -35,23 +35,21 @@ GradientResult run_blurred(const MethodType& method, const Scene& scene,
   const Stopwatch watch;
   const Blur blur = resolved(method.blurred_by(options.blur), scene);
   std::vector<Parameter> parameters;
+  std::vector<BlurredNumber> derived;
   for (const std::string& name : options.parameters) {
     parameters.push_back(find_parameter(scene, name));
+    derived.push_back({parameters.back()});
   }
-  check_still(scene, "the method \"" + method.name + "\"", parameters);
-  std::vector<std::unique_ptr<SampleEstimator>> passes;
-  for (size_t k = 0; k < parameters.size(); k += kLanes) {
-    const auto some =
-        std::span(parameters).subspan(k).first(std::min<size_t>(kLanes, parameters.size() - k));
-    passes.push_back(std::make_unique<BlurredEstimator>(scene, blur, some, settings.threads,
-                                                        Numbers::kIndependent));
-  }
+  const auto passes = blurred_passes(scene, blur, derived, settings.threads);
+  const EstimatorsAt at = [&](double u) {
+    return EstimatorsAtTime{{}, blurred_passes(scene, blur, derived, settings.threads, u)};
+  };
   check_memory(passes);
   GradientResult result = empty_result(scene, options, method.terms[0]);
   result.settings = {{"sigma", blur.sigma}, {"gamma", blur.gamma}};
   result.warnings.push_back(bias_of_blur(scene, blur));
   result.setup_seconds = watch.seconds();
-  run_batches(passes, settings, watch, [&](const Batch& batch, const auto& sums) {
+  const auto take = [&](const Batch& batch, const auto& sums) {
     result.radiance.add_batch(sums[0].radiance, batch.count());
     for (size_t k = 0; k < parameters.size(); ++k) {
       collect({&sums[k / kLanes].images[k % kLanes]}, result.terms, batch.count(), scene.film,
@@ -62,7 +60,8 @@ GradientResult run_blurred(const MethodType& method, const Scene& scene,
       result.non_finite.merge(s.non_finite);
     }
     result.spp += batch.count();
-  });
+  };
+  run_batches(passes, settings, watch, take, needs_times(scene, parameters) ? at : EstimatorsAt());
   result.seconds = watch.seconds();
   return result;
 }

@@ -99,8 +99,10 @@ CentralDifferences central_differences(const Scene& scene, const std::vector<Dif
       const auto choices = std::make_shared<const BlurredScene>(*unmoved, *blur, settings.threads);
       EstimatorsAtTime now{{unmoved, choices}};
       for (const Scene& one : moved) {
+        const auto there = placed(one);
+        now.kept.push_back(there);
         now.list.push_back(
-            std::make_unique<BlurredEstimator>(one, *choices, settings.threads, numbers));
+            std::make_unique<BlurredEstimator>(*there, *choices, settings.threads, numbers));
       }
       return now;
     }

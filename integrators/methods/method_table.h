@@ -22,6 +22,9 @@ inline std::vector<MethodType> other_methods() {
            .description = "path tracing with multiple importance sampling of emitters and BSDFs",
            .defaults = {Task::kImage},
            .image = ImageMethod{}},
+          {.name = "light-traced",
+           .description = "the same and particles from area lights, for caustics",
+           .image = ImageMethod{.from_lights = true}},
           {.name = "lines",
            .description = "direct light, ambient occlusion and open sky, integrated along lines "
                           "between silhouettes",

@@ -8,6 +8,7 @@
 #include "integrators/estimates/batches.h"
 #include "integrators/methods/blurred_estimator.h"
 #include "integrators/methods/faces_estimator.h"
+#include "integrators/methods/light_traced_estimator.h"
 #include "integrators/methods/radiance_estimator.h"
 #include "integrators/methods/render_seeds.h"
 #include "integrators/methods/visibility_estimator.h"
@@ -65,8 +66,11 @@ std::unique_ptr<SampleEstimator> make_estimator(const Scene& scene, const RunSet
   }
   if (options.method->blurs) {
     const Blur blur = resolved(options.method->blurred_by(options.blur), scene);
-    return std::make_unique<BlurredEstimator>(scene, blur, std::span<const Parameter>(),
+    return std::make_unique<BlurredEstimator>(scene, blur, std::span<const BlurredNumber>(),
                                               settings.threads, numbers);
+  }
+  if (method.from_lights) {
+    return std::make_unique<LightTracedEstimator>(scene, settings.threads, numbers);
   }
   return std::make_unique<RadianceEstimator>(scene, settings.threads, method.closed_light, numbers);
 }
@@ -123,9 +127,14 @@ RenderResult run(const Scene& scene, const EstimatorList& estimators, const RunS
         if (points == FilmPoints::kFaces) {
           result.radiance.add_exact(sums[0].radiance);
         } else {
-          result.radiance.add_batch(sums[0].radiance, batch.count());
+          // Particles have an image of their own.
+          std::vector<double> radiance = sums[0].radiance;
+          for (const std::vector<double>& image : sums[0].images) {
+            for (size_t i = 0; i < image.size(); ++i) radiance[i] += image[i];
+          }
+          result.radiance.add_batch(radiance, batch.count());
         }
-        result.rays += sums[0].costs[0].rays;
+        for (const TermCost& cost : sums[0].costs) result.rays += cost.rays;
         result.non_finite.merge(sums[0].non_finite);
         result.spp += batch.count();
       },

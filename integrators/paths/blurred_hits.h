@@ -18,7 +18,7 @@ struct BlurredRay {
   double t_min = 0, t_max = std::numeric_limits<double>::infinity();
   FaceRef start = {};
   int bounces = 0;         // before it
-  double pdf = 0;          // of its direction [1/sr]; 0 of the camera's
+  double pdf = 0;          // of its direction [1/sr]; 0 of the camera's and of smooth rays
   Lights::Point lights{};  // where it starts
 };
 

@@ -7,8 +7,9 @@
 // since all dw add up to 0. One j other than k is drawn in proportion to |dw_j|, and S_j is the
 // radiance of a path of plain numbers by the same random numbers. Such a path starts no others.
 //
-// Directions are held, and densities and MIS weights are constants, as in path.h. MIS weighs pairs
-// of a direction and a surface: what a light draws, and what a BSDF's direction meets.
+// Directions of rough lobes are held, and densities and MIS weights are constants, as in path.h.
+// MIS weighs pairs of a direction and a surface: what a light draws, and what a BSDF's direction
+// meets.
 #include <algorithm>
 #include <optional>
 #include <type_traits>
@@ -110,7 +111,7 @@ class BlurredPath {
                                                  {wo, distance, surface.n_g}));
   }
   Rgb<S> sky() const {
-    if (!scene_.environment || (ray_.pdf == 0 && scene_.hide_emitters)) return {};
+    if (!scene_.environment || (ray_.bounces == 0 && scene_.hide_emitters)) return {};
     const Rgb<S> radiance = environment_radiance<S>(*scene_.environment, ray_.direction);
     if (ray_.pdf == 0) return radiance;
     return radiance * share_seen(s_.lights().pdf_environment(ray_.lights, value(ray_.direction)));
@@ -143,10 +144,16 @@ class BlurredPath {
     next.start = surface.face;
     next.lights = s_.lights().at(value(surface.p));
     next.bounces = ray_.bounces + 1;
-    sum_ += throughput_ * direct(next, scattering);
+    if (scattering.is_rough()) sum_ += throughput_ * direct(next, scattering);
     Rng rng = key_.at(Purpose::kBsdf, ray_.bounces);
-    const double u = rng.uniform();
-    const auto wo = scattering.sample(u, rng.uniform());
+    const double u = rng.uniform(), v = rng.uniform();
+    if (const auto smooth = draw_smooth(scattering, rng.uniform())) {
+      next.direction = smooth->wo;
+      throughput_ = throughput_ * smooth->weight;
+      ray_ = next;
+      return !detail::stays_black(smooth->weight);
+    }
+    const auto wo = scattering.sample(u, v);
     if (!wo) return false;
     const auto [f, pdf] = scattering.eval_with_pdf(*wo);
     if (!(pdf > 0) || detail::stays_black(f)) return false;
@@ -156,6 +163,20 @@ class BlurredPath {
     const bool last = is_complete(next.bounces);
     ray_ = next;
     return !last || (ordered() && (s_.lights().on_shapes() || scene_.environment));
+  }
+
+  // A smooth ray, its weight over its probability; none for the rough lobes. It moves with the
+  // surface, and no light that is drawn comes its way.
+  static std::optional<SmoothRay<S>> draw_smooth(const Scattering<S>& scattering, double u) {
+    if (!scattering.is_smooth()) return {};
+    const SmoothShares shares = scattering.shares();
+    if (u < shares.rough) return {};
+    u -= shares.rough;
+    int k = 0;
+    while (k + 1 < shares.count && u >= shares.ray[k]) u -= shares.ray[k++];
+    SmoothRay<S> ray = scattering.smooth_ray(k);
+    ray.weight = shares.ray[k] > 0 ? ray.weight * (1 / shares.ray[k]) : Rgb<S>();
+    return ray;
   }
 
   // Light that is scattered once from a light that is drawn. ray: from the surface.

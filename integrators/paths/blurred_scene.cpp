@@ -1,8 +1,8 @@
 // Scenes of blurred faces: what they may have, and their emitters.
 #include "integrators/paths/blurred_scene.h"
 
+#include "integrators/paths/straight_way.h"
 #include "limn/core/error.h"
-#include "limn/core/exposure.h"
 
 namespace limn {
 namespace {
@@ -20,19 +20,30 @@ bool is_flat(const Mesh& mesh) {
   return true;
 }
 
+// Also beyond the sides of its faces, over which texture coordinates stay linear.
+bool is_continuous(const Texture& texture) {
+  if (texture.discontinuous_between_texels() || texture.discontinuous_between_faces()) return false;
+  Texture::Discontinuities lines;
+  const bool all = texture.add_discontinuities({{{-4, -4}, {8, -4}, {-4, 8}}}, 1, lines);
+  return all && lines.inside.empty();
+}
+
 }  // namespace
 
 void check_blurred(const Scene& scene) {
-  check_still(scene, "the method \"blurred\"");
   for (const Shape& shape : scene.shapes) {
     const auto refuse = [&](const std::string& what) {
       throw InputError(shape.where, "blurred faces do not support " + what);
     };
     if (!is_flat(shape.mesh)) refuse("interpolated normals: set face_normals");
-    if (shape.mesh.textured) refuse("textures");
-    const Bsdf::Lobes& lobes = shape.bsdf->lobes();
-    if (lobes.smooth) refuse("smooth lobes: this is " + shape.bsdf->describe());
-    if (lobes.through) refuse("light that passes surfaces: this is " + shape.bsdf->describe());
+    if (shape.radiance_texture) refuse("textured emitters");
+    for (int k = 0; k < shape.bsdf->texture_count(); ++k) {
+      if (is_continuous(shape.bsdf->texture(k))) continue;
+      refuse("textures with discontinuities: \"" + shape.bsdf->texture_name(k) + "\" has some");
+    }
+  }
+  if (has_straight_ways(scene)) {
+    throw InputError({scene.file}, "blurred faces do not support masks and thin panes");
   }
 }
 

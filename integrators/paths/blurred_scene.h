@@ -8,8 +8,8 @@
 
 namespace limn {
 
-// InputError, with the place, for what blurred faces do not have: interpolated normals, textures,
-// smooth lobes, light that passes surfaces.
+// InputError, with the place, for what blurred faces do not have: interpolated normals, textured
+// emitters, textures with discontinuities, light that passes surfaces straight on.
 void check_blurred(const Scene& scene);
 
 // A scene whose emitters are as large as they are blurred, for light sampling: the opacity of what

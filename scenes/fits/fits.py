@@ -11,6 +11,8 @@
     scenes/fits/fits.py gears     how far each of fifteen gears is turned, from their shadows
     scenes/fits/fits.py displacement  162 vertices along their normals, from eight sides
     scenes/fits/fits.py regularised  from bad starts, see ../regularised
+    scenes/fits/fits.py bad_starts   a film of these: scenes/pictures/bad_starts.webp
+    scenes/fits/fits.py sweeps       derivatives by sigma and gamma: scenes/pictures/sweeps.webp
     scenes/fits/fits.py curves    of these three: scenes/pictures/fit_curves.webp
     scenes/fits/fits.py picture   of the shapes that these found: scenes/pictures/fits.webp
 
@@ -386,12 +388,14 @@ class Start:
     scene: str
     parameters: list
     sigma: float
-    start: list  # defines
+    start: list  # defines; OUT: the folder of fits
     truth: list = field(default_factory=list)
     goal: list = field(default_factory=list)  # what the truth's values are; else the loss tells
     far: float = 0  # how far the start is from it
+    # Of a start that overlaps its target: defines, and the truth's values from there.
+    near: tuple = ()
     steps: int = 60
-    options: str = "--spp 4 --step 4 --step-half-life 20"
+    options: str = "--spp 4 --step 4 --step-half-life 20 --snapshots 5"
 
 
 def moves(name, axes):
@@ -412,50 +416,154 @@ REGULARISED = {
     "shadow": Start("room", moves("box", "xz"), 0.15, [*VIEW_OF_FLOOR, "x=0.4", "z=-0.3"],
                     VIEW_OF_FLOOR, [-0.4, 0.3], 0.5),
     "far shadow": Start("room", moves("box", "xz"), 0.15, [*VIEW_OF_FLOOR, "x=0.75", "z=-0.3"],
-                        VIEW_OF_FLOOR, [-0.75, 0.3], 0.808, 90),
+                        VIEW_OF_FLOOR, [-0.75, 0.3], 0.808, ([*VIEW_OF_FLOOR, "x=0.2"], [-0.2, 0]), 90),
     "torus": Start("torus", moves("torus", "xy"), 0.16, ["x=1.5", "y=0.2"], [], [-1.5, -0.2],
-                   1.513),
+                   1.513, (["x=0.3"], [-0.3, 0])),
     "wide torus": Start("torus", moves("torus", "xy"), 0.16, ["x=1.8", "y=0.2", "fov=70"],
-                         ["fov=70"], [-1.8, -0.2], 1.811),
+                         ["fov=70"], [-1.8, -0.2], 1.811, (["x=0.3", "fov=70"], [-0.3, 0])),
     "mirrors": Start("../fits/two_mirrors", moves("object", "xyz"), 0.16,
                      ["width=48", "height=24", "x=0.2", "y=1.3", "z=0.2"],
-                     ["width=48", "height=24"], [-0.2, -1.3, -0.2], 1.330, 90),
+                     ["width=48", "height=24"], [-0.2, -1.3, -0.2], 1.330,
+                     (["width=48", "height=24", "y=0.3"], [0, -0.3, 0]), 90),
+    "velocity": Start("torus", [*(f"torus.velocity.{a}" for a in "xy"), "torus.vertex_positions"],
+                      0.02, ["mesh=OUT/rough.obj", "close=1", "x=-0.3", "x1=0.3", "y=-0.8", "y1=0.8"],
+                      ["mesh=OUT/cube.obj", "close=1", "x=-1", "x1=1"], [1.4, -1.6], 2.126, (), 90),
+    "texture": Start("mirror", ["paint.reflectance.data"], 0.0025, ["paint=OUT/grey.png"],
+                     ["paint=OUT/paint.png"],
+                     options="--spp 4 --step 20 --step-half-life 20 --snapshots 5"),
+    "index": Start("pane", ["glass.eta"], 0.04, ["ior=1.1"], ["ior=1.9"], [1.9], 0.8, (["ior=1.8"], [1.9]), 90),
+    "vertices": Start("torus", ["torus.vertex_positions"], 0.4, ["mesh=OUT/cube.obj", "x=0.9"],
+                      ["mesh=OUT/rough.obj", "x=-0.9"], [], 0,
+                      (["mesh=OUT/cube.obj", "x=-0.9"], []), 150,
+                      options="--spp 4 --smoothing 0.5 --step 20 --step-half-life 40 --snapshots 5"),
 }
 
 
-def regularised(fits, _):
-    """After Quinn 2021, Sec. 5.2 and 5.4: exact gradients, a pyramid, and blurred first steps."""
+def regularised_files(fits):
+    """Meshes and bitmaps of these fits."""
+    import numpy as np
+    from PIL import Image
     from paper_figures.meshes import torus, write_obj
 
     points, faces = torus(168)
     write_obj(fits.path("torus.obj"), 0.5 * points, faces)
-    mesh = [f"mesh={os.path.abspath(fits.path('torus.obj'))}", "format=obj"]
+    cube = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * 0.35
+    sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    faces = np.array([f for a, b, c, d in sides for f in ((a, b, c), (a, c, d))])
+    rng = np.random.default_rng(1)
+    write_obj(fits.path("cube.obj"), cube, faces)
+    write_obj(fits.path("rough.obj"), cube + rng.uniform(-0.15, 0.15, cube.shape), faces)
+    paint = rng.integers(26, 230, (8, 8, 3)).astype(np.uint8)
+    Image.fromarray(paint).save(fits.path("paint.png"))
+    Image.fromarray(np.full_like(paint, 128)).save(fits.path("grey.png"))
+
+
+def regularised(fits, _):
+    """After Quinn 2021, Sec. 5.2 and 5.4: exact gradients, a pyramid, and blurred first steps."""
+    regularised_files(fits)
+    mesh = ["mesh=OUT/torus.obj", "format=obj"]
     rows = []
     for name in fits.chosen(REGULARISED):
         s, found = REGULARISED[name], []
-        start, truth = ([*d, *(mesh if s.scene != "room" else [])] for d in (s.start, s.truth))
+        # The last of several defines counts.
+        start, truth, near = (
+            [d.replace("OUT", os.path.abspath(fits.out)) for d in
+             (mesh if s.scene in ("torus", "../fits/two_mirrors") else []) + own]
+            for own in (s.start, s.truth, s.near[0] if s.near else []))
         base = f"../regularised/{s.scene}"
         target = fits.render(base, f"regularised_{name.replace(' ', '_')}.exr", truth)
         blur = f"--sigma {s.sigma} --blur-steps {s.steps * 2 // 3}"
-        for variant, more in (("exact", ""), ("pyramid", "--pyramid 5"), ("blurred", blur)):
+        first = None
+        for variant, more in (("exact", ""), ("pyramid", "--pyramid 5"), ("blurred", blur),
+                              ("good start", "")):
             ends = []
+            if variant == "good start" and not s.near:
+                continue
             for seed in (1, 2, 3):
                 fit = fits.fit(folder_of(name, f"{variant} {seed}"), base, [target], s.steps,
                                " ".join(repeated("--wrt", s.parameters)) +
-                               f" {s.options} --seed {seed} {more}", start)
-                ends.append(_end(fit, s))
+                               f" {s.options} --seed {seed} {more}",
+                               near if variant == "good start" else start)
+                first = first or fit["history"][0]["loss"]
+                goal = s.near[1] if variant == "good start" else s.goal
+                ends.append(_end(fit, goal, s.far, first))
             found.append(" ".join(ends))
-        rows.append([name, *found])
-    return ["fit", "exact", "pyramid", "blurred"], rows
+        rows.append([name, *found, *[""] * (4 - len(found))])
+    return ["fit", "exact", "pyramid", "blurred", "exact, good start"], rows
 
 
-def _end(fit, start):
+def bad_starts(fits, _):
+    """Targets, exact and blurred fits, step by step."""
+    from PIL import Image
+
+    names, tile, across = fits.chosen(REGULARISED), 72, 5
+    frames, rows = [], []
+    for step in range(0, 95, 5):
+        frame = Image.new("RGB", (across * 3 * tile, -(-len(names) // across) * tile), "white")
+        for i, name in enumerate(names):
+            for k, variant in enumerate(("target", "exact", "blurred")):
+                folder = folder_of(name, f"{'exact' if k == 0 else variant} 1")
+                at = min(step, REGULARISED[name].steps)
+                file = "view_0_target.png" if k == 0 else f"step_{at:05}_view_0.png"
+                picture = Image.open(fits.path(folder, file)).convert("RGB")
+                size = (tile - 2, (tile - 2) * picture.height // picture.width)
+                frame.paste(picture.resize(size, Image.Resampling.NEAREST),
+                            ((i % across * 3 + k) * tile, i // across * tile))
+        frames.append(frame)
+        rows.append([step, len(names)])
+    frames[0].save(os.path.join(ROOT, "scenes", "pictures", "bad_starts.webp"), quality=60,
+                   method=6, save_all=True, append_images=[*frames[1:], *frames[-1:] * 6],
+                   duration=200, loop=0)
+    return ["step", "fits"], rows
+
+
+SIGMAS, GAMMAS = ("0.04", "0.01", "0.0025", "0.0006", "0.00015"), ("1.6", "0.4", "0.1", "0.025")
+
+
+def sweeps(fits, _):
+    """After Quinn 2021, Figs. 5.16 and 5.2: derivatives against sigma, images against gamma."""
+    from PIL import Image
+
+    regularised_files(fits)
+    torus, room = scene("../regularised/torus"), scene("../regularised/room")
+    size = ["width=64", "height=64"]
+    mesh = [f"mesh={os.path.abspath(fits.path('torus.obj'))}", "format=obj"]
+    folder, rows, tiles = fits.path("sweep"), [], [[], [], []]
+
+    def image(row, file, defines, options):
+        fits.run("render", file, *defined(size + defines), *options.split(), "-o", f"{folder}.exr")
+        tiles[row].append(Image.open(f"{folder}.png").convert("RGB"))
+
+    for sigma in SIGMAS:
+        image(0, torus, mesh, f"--spp 64 --method blurred --sigma {sigma}")
+        fits.run("compare", torus, *defined(size + mesh), "--wrt", "torus.translate.x", "--methods",
+                 "blurred,adaptive", "--sigma", sigma, "--time", "1", "--repeats", "5",
+                 "--no-report", "-o", folder)
+        tiles[1].append(Image.open(os.path.join(folder, "blurred.png")).convert("RGB"))
+        found = read_json(os.path.join(folder, "compare.json"))["methods"]
+        rows.append([sigma, *(f"{math.sqrt(m['summary'][0]['relative_mse']):.4f}" for m in found),
+                     f"{found[0]['summary'][0]['bias']['p']:.2g}"])
+    image(0, torus, mesh, "--spp 64")
+    tiles[1].append(Image.open(os.path.join(folder, "reference.png")).convert("RGB"))
+    for gamma in GAMMAS:
+        image(2, room, [], f"--spp 64 --method blurred --sigma 0.002 --gamma {gamma}")
+    image(2, room, [], "--spp 64 --method blurred --sigma 0.002")
+    image(2, room, [], "--spp 64")
+    sheet = Image.new("RGB", (6 * 130, 3 * 130), "white")
+    for y, row in enumerate(tiles):
+        for x, tile in enumerate(row):
+            sheet.paste(tile.resize((128, 128), Image.Resampling.NEAREST), (x * 130, y * 130))
+    sheet.save(os.path.join(ROOT, "scenes", "pictures", "sweeps.webp"), quality=80, method=6)
+    return ["sigma", "relative error", "of adaptive", "p of no bias"], rows
+
+
+def _end(fit, goal, far, first):
     """How far the end is from the truth, over how far the start was; else of losses their root."""
-    if start.goal:
-        left = [v["value"] - goal for v, goal in zip(fit["scalars"], start.goal)]
-        return f"{math.hypot(*left) / start.far:.3f}"
+    if goal:
+        left = [v["value"] - g for v, g in zip(fit["scalars"], goal)]
+        return f"{math.hypot(*left) / far:.3f}"
     last = [h["loss"] for h in fit["history"][-5:]]
-    return f"{math.sqrt(max(0, sum(last)) / len(last) / fit['history'][0]['loss']):.3f}"
+    return f"{math.sqrt(max(0, sum(last)) / len(last) / first):.3f}"
 
 
 def panels_of(rows, columns, height, **shared):
@@ -526,6 +634,7 @@ def picture(fits, _):
 
 EXPERIMENTS = {**dict.fromkeys(SHAPES, fit_shape), "pose": pose, "drift": drift,
                **dict.fromkeys(FUNCTIONS, fit_function), "regularised": regularised,
+               "bad_starts": bad_starts, "sweeps": sweeps,
                "curves": curves, "picture": picture}
 
 
@@ -540,7 +649,7 @@ def main():
     parser.add_argument("--threads", type=int, help="default: all cores")
     parser.add_argument("--limn", default=os.path.join(ROOT, "build", "limn"), help="the program")
     arguments = parser.parse_args()
-    if arguments.only and arguments.name in ("drift", "curves", "picture"):
+    if arguments.only and arguments.name in ("drift", "curves", "picture", "sweeps"):
         parser.error(f"--only: {arguments.name} is one whole")
     use_one_with_matplotlib()
     os.makedirs(arguments.output, exist_ok=True)

@@ -291,6 +291,63 @@ TEST(BlurredFit, ReachesWhatExactGradientsMiss) {
   }
 }
 
+// Each number of an array has a derivative image of its own, at the times of a shutter.
+TEST(BlurredFit, TakesVerticesAndVelocities) {
+  const TempFiles files;
+  SceneParts parts;
+  parts.max_depth = 1;
+  parts.width = parts.height = 6;
+  parts.body = animated(obj_shape("box", write_mesh(files, "box.obj", cube_mesh()), true, 0.6,
+                                  {0.3, 0.5, 0}, area_light("glow", "1")),
+                        {0, 0, 0});
+  const Scene scene = scene_of_text(with_shutter(parts, 0, 1));
+  Image target(6, 6, 3);
+  for (float& x : target.data) x = 0.5f;
+  FitOptions options = options_of({"box.velocity.x", "box.vertex_positions"}, 0.02, 1);
+  options.optimiser = OptimiserKind::kGradientDescent;
+  options.step = 10;
+  options.smoothing = 0;
+  const RunSettings settings = settings_of(4, 3);
+  RunSettings own = settings;
+  own.seed = mix_bits(mix_bits(mix_bits(settings.seed)));
+  const Image adjoint = image_loss(scene, target, {}, own, {}).adjoint;
+  // The same passes: which surfaces pairs take depends on all parameters of one.
+  GradientOptions derived;
+  derived.method = Method("blurred");
+  derived.blur = options.blur;
+  derived.parameters = {"box.velocity.x"};
+  const std::vector<Vec3f> before(scene.shapes[0].mesh.positions);
+  ASSERT_EQ(before.size(), 8u);
+  for (size_t k = 0; k < 3 * before.size(); ++k) {
+    derived.parameters.push_back(fmt::format("box.vertex_positions.{}.{}", k / 3, "xyz"[k % 3]));
+  }
+  std::vector<double> steps;
+  for (const ParameterGradient& g : limn::gradient(scene, derived, own).parameters) {
+    const auto& name = steps.empty() ? g.name : options.parameters[1];
+    const double unit = find_parameter_or_array(scene, name).natural_step;
+    double slope = 0;
+    for (size_t i = 0; i < adjoint.data.size(); ++i) {
+      slope += g.total.mean(i) * static_cast<double>(adjoint.data[i]);
+    }
+    steps.push_back(-options.step * unit * unit * slope);
+  }
+  Fit fit({{scene, target, {}}}, options, settings);
+  const FitRecord record = fit.step().value();
+  const Mesh& after = fit.views()[0].scene.shapes[0].mesh;
+  EXPECT_NE(steps[0], 0);
+  EXPECT_NEAR(record.values[0], steps[0], 1e-9 * std::fabs(steps[0]));
+  int moved = 0;
+  for (size_t k = 0; k < 3 * before.size(); ++k) {
+    const int axis = static_cast<int>(k % 3);
+    const double now = static_cast<double>(after.positions[k / 3][axis]);
+    const double then = static_cast<double>(before[k / 3][axis]);
+    // Positions are floats.
+    EXPECT_NEAR(now - then, steps[k + 1], 2e-7) << k;
+    moved += now != then;
+  }
+  EXPECT_GT(moved, 12);
+}
+
 TEST(BlurredFit, RefusesWhatItCannotTake) {
   const TempFiles files;
   const Scene scene = shadow_scene(files, 0, 4);
@@ -308,7 +365,6 @@ TEST(BlurredFit, RefusesWhatItCannotTake) {
   const std::vector<std::string> x{"box.translate.x"};
   tells(options_of(x, 0.1, 0), "needs both `sigma`, of the first step, and `blur_steps`");
   tells(options_of(x, 0, 3), "needs both `sigma`");
-  tells(options_of({"box.vertex_positions"}, 0.1, 3), "\"box.vertex_positions\" is an array");
   FitOptions options = options_of(x, 0, 0);
   options.sigma_end = 0.1;
   tells(options, "give sigma, too");
@@ -323,10 +379,9 @@ TEST(BlurredFit, RefusesWhatItCannotTake) {
   options.backward.terms = {"camera"};
   tells(options, "leave out `terms`");
 
-  // Of the scene: the message names the fit, not a method that nobody named.
+  SceneParts parts;
+  parts.width = parts.height = 4;
   const auto refusal = [&](const std::string& bsdf, const std::string& parameter) -> std::string {
-    SceneParts parts;
-    parts.width = parts.height = 4;
     parts.body = square("floor", 3, -90, {0, 0, 0}, bsdf) +
                  square("lamp", 0.3, 90, {0, 4, 0}, area_light("glow", "30"));
     const Scene of_text = scene_of_text(with_shutter(parts, 0, 1));
@@ -341,10 +396,18 @@ TEST(BlurredFit, RefusesWhatItCannotTake) {
       refusal(R"(<bsdf type="diffuse"><texture type="checkerboard" name="reflectance"/></bsdf>)",
               "glow.radiance");
   EXPECT_NE(checks.find("blurred faces do not support textures"), std::string::npos) << checks;
-  const std::string moving = refusal(diffuse("grey", ".5"), "floor.velocity.x");
-  EXPECT_NE(moving.find("a fit that begins blurred cannot take a scene in which something moves"),
-            std::string::npos)
-      << moving;
+  parts.body = obj_shape("ball", write_mesh(files, "ball.obj", icosphere_mesh(3)), true, 1,
+                         {0, 0, 0}, area_light("glow", "30"));
+  try {
+    Fit({{make_scene(files, parts), Image(4, 4, 3), {}}},
+        options_of({"ball.vertex_positions"}, 0.1, 3), settings_of(1, 0));
+    FAIL();
+  } catch (const InputError& error) {
+    const std::string text = error.what();
+    EXPECT_NE(text.find("is an array of 1926 numbers: a fit that begins blurred takes at most"),
+              std::string::npos)
+        << text;
+  }
 }
 
 }  // namespace

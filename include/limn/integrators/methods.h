@@ -22,6 +22,7 @@ struct ImageMethod {
   bool looks_around = false;
   bool by_lines = false;       // between silhouettes
   bool uniform_lines = false;  // through a map at equal azimuths
+  bool from_lights = false;    // also particles, see light_traced_estimator.h
 };
 
 // How a method computes in reverse mode.
