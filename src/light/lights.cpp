@@ -219,13 +219,14 @@ void Lights::sample(std::span<const Draw> draws, std::span<const Numbers> u) con
   size_t of[kMostDraws], count = 0;
   for (size_t i = 0; i < draws.size(); ++i) {
     const Point& place = *draws[i].place;
-    const size_t light = choose(place, u[i][0]);
+    // The first two numbers, which alone fill every square evenly (rng.cpp), place on the light.
+    const size_t light = choose(place, u[i][3]);
     if (environment_ && light == area_lights_.size()) {
       of[count] = i;
-      numbers[count++] = {u[i][1], u[i][2]};
+      numbers[count++] = {u[i][0], u[i][1]};
     } else {
       renew(*draws[i].sample, [&] {
-        return all_[light]->sample(place.p, probability(place, light), {u[i][1], u[i][2], u[i][3]});
+        return all_[light]->sample(place.p, probability(place, light), {u[i][2], u[i][0], u[i][1]});
       });
     }
   }

@@ -166,16 +166,9 @@ class MapDensity::Builder {
   }
 
   void add_leaves() {
-    constexpr int kBlock = 1 << (kLargestLog - kGridLog);
     d_.grid_.resize(chosen_.size());
-    for (int row = 0; row < rows_; row += kBlock) {
-      for (int column = 0; column < d_.grid_width_; column += kBlock) {
-        const auto first = static_cast<uint32_t>(d_.leaves_.size());
-        for (int y = row; y < std::min(row + kBlock, rows_); ++y) {
-          for (int x = column; x < std::min(column + kBlock, d_.grid_width_); ++x) add_square(x, y);
-        }
-        d_.blocks_.push_back({first, static_cast<uint32_t>(d_.leaves_.size()) - first});
-      }
+    for (int row = 0; row < rows_; ++row) {
+      for (int column = 0; column < d_.grid_width_; ++column) add_square(column, row);
     }
   }
   void add_square(int column, int row) {
@@ -227,7 +220,11 @@ MapDensity::MapDensity(int width, int height, std::span<const float> importance)
     cos_theta_.push_back(std::cos(kPi * row / (height - 1)));
   }
   Builder(*this, importance).run();
-  build_distributions();
+  int log = kLargestLog;
+  while (1 << log < std::max(width_, height_ - 1)) ++log;
+  const auto [root, total] = grow(0, 0, log);
+  root_ = root;
+  inverse_total_ = 1 / total;
 }
 
 MapDensity::Patch MapDensity::patch(int column, int row, int log) const {
@@ -253,64 +250,57 @@ double MapDensity::mass(const Leaf& leaf) const {
   return 0.25 * sum_of(leaf.corners) * leaf.scale * solid_angle(leaf);
 }
 
-void MapDensity::build_distributions() {
-  leaves_before_.resize(leaves_.size());
-  double total = 0;
-  for (const Block& block : blocks_) {
-    const std::span<double> weights(&leaves_before_[block.first], block.count);
-    double sum = 0;
-    for (uint32_t i = 0; i < block.count; ++i) {
-      sum += weights[i] = mass(leaves_[block.first + i]);
-    }
-    accumulate(weights, sum);
-    blocks_before_.push_back(sum);
-    total += sum;
-    most_leaves_ = std::max(most_leaves_, block.count);
+MapDensity::Grown MapDensity::grow(int column, int row, int log) {
+  if (column >= width_ || row + 1 >= height_) return {0, 0};
+  const Square& here = square(column, row);
+  if (static_cast<int>(here.log) == log) {
+    const Leaf& only = leaf(here, column, row);
+    return {~static_cast<int32_t>(&only - leaves_.data()), mass(only)};
   }
-  accumulate(blocks_before_, total);
-  inverse_total_ = 1 / total;
+  const size_t index = nodes_.size();
+  nodes_.push_back({});
+  const int half = 1 << (log - 1);
+  Grown parts[4];
+  for (int k = 0; k < 4; ++k) {
+    parts[k] = grow(column + k / 2 * half, row + k % 2 * half, log - 1);
+    nodes_[index].quarter[k] = parts[k].node;
+  }
+  const auto share = [](double a, double b) { return a > 0 ? a / (a + b) : 0; };
+  const double left = parts[0].mass + parts[1].mass, right = parts[2].mass + parts[3].mass;
+  nodes_[index].left = share(left, right);
+  nodes_[index].upper[0] = share(parts[0].mass, parts[1].mass);
+  nodes_[index].upper[1] = share(parts[2].mass, parts[3].mass);
+  return {static_cast<int32_t>(index), left + right};
 }
 
-// Those without weight at the end get 1, which no number reaches.
-void MapDensity::accumulate(std::span<double> weights, double total) {
-  double sum = 0;
-  for (double& weight : weights) {
-    const double before = sum;
-    sum += weight;
-    weight = total > 0 ? before / total : 0;
-  }
-}
-
-// By bisection. Of items that no weight parts the last is taken, which alone may have some.
-inline wide::Ints MapDensity::choose(std::span<const double> before, const wide::Ints& first,
-                                     const wide::Ints& count, uint32_t most, wide::Doubles& u) {
-  using wide::Doubles, wide::Ints;
-  const auto at = [&](const Ints& item) {
-    return wide::gather([&](int i) { return before[static_cast<size_t>(item[i])]; });
-  };
-  const Ints last = first + count - 1;
-  Ints chosen = first;
-  for (uint32_t step = std::bit_floor(most); step > 0; step /= 2) {
-    const Ints next = wide::min(chosen + static_cast<int>(step), last);
-    chosen = wide::select(u < at(next), chosen, next);
-  }
-  const Doubles lower = at(chosen);
-  const Doubles upper = wide::gather(
-      [&](int i) { return chosen[i] < last[i] ? before[static_cast<size_t>(chosen[i]) + 1] : 1; });
-  u = wide::min((u - lower) / (upper - lower), 1 - 0x1p-53);
-  return chosen;
+// Whether u lies below the share; u is rescaled to be uniform again, where `changes`.
+LIMN_WIDE wide::Mask is_below(const wide::Doubles& share, const wide::Mask& changes,
+                              wide::Doubles& u) {
+  const wide::Mask below = u < share;
+  const wide::Doubles part = select(below, u, u - share), size = select(below, share, 1 - share);
+  u = select(changes, wide::min(part / size, 1 - 0x1p-53), u);
+  return below;
 }
 
 MapDensity::Drawn MapDensity::sample(const wide::Doubles& u1, const wide::Doubles& u2) const {
-  using wide::Doubles, wide::gather, wide::gather_ints, wide::Ints, wide::to_doubles;
+  using wide::Doubles, wide::gather, wide::gather_ints, wide::Ints, wide::Mask, wide::to_doubles;
   Doubles down = u1, along = u2;
-  const auto blocks = static_cast<uint32_t>(blocks_.size());
-  const Ints b = choose(blocks_before_, Ints{}, Ints{} + static_cast<int>(blocks), blocks, down);
-  const auto block = [&](int i) { return blocks_[static_cast<size_t>(b[i])]; };
-  const Ints first = gather_ints([&](int i) { return static_cast<int32_t>(block(i).first); });
-  const Ints count = gather_ints([&](int i) { return static_cast<int32_t>(block(i).count); });
-  const Ints l = choose(leaves_before_, first, count, most_leaves_, along);
-  const auto leaf = [&](int i) { return leaves_[static_cast<size_t>(l[i])]; };
+  Ints at = Ints{} + root_;
+  const auto inner = [&](int i) { return at[i] >= 0; };
+  for (;;) {
+    bool any = false;
+    for (int i = 0; i < wide::kWidth; ++i) any |= inner(i);
+    if (!any) break;
+    const auto node = [&](int i) -> const Node& { return nodes_[inner(i) ? at[i] : 0]; };
+    const Mask changes = __builtin_convertvector(at >= 0, Mask);
+    const Mask left = is_below(gather([&](int i) { return node(i).left; }), changes, along);
+    const Mask upper =
+        is_below(gather([&](int i) { return node(i).upper[left[i] + 1]; }), changes, down);
+    at = gather_ints(
+        [&](int i) { return inner(i) ? node(i).quarter[3 + 2 * left[i] + upper[i]] : at[i]; });
+  }
+  const auto l = [&](int i) { return static_cast<size_t>(~at[i]); };
+  const auto leaf = [&](int i) { return leaves_[l(i)]; };
   // The leaf's extent, as in `patch`.
   const Ints log = gather_ints([&](int i) { return static_cast<int32_t>(leaf(i).log); });
   const Ints side = (Ints{} + 1) << log;

@@ -24,9 +24,9 @@ namespace limn {
 // near a pole their ratio would be unbounded.) Leaves are as large as this permits. A smooth sky of
 // half a million cells has some thousand. Where the importance is positive, so is the density.
 //
-// A draw selects a block of 64 by 64 cells by the first number and one of its leaves by the second,
-// each by its cumulative distribution, and places in the leaf by what is left of both: numbers that
-// are spread evenly give draws that are, which alias tables would not.
+// A draw descends the quadtree: one number chooses between left and right at every node and places
+// in the leaf by what is left of it, the other between top and bottom. So numbers that are spread
+// evenly over the unit square give draws that are (Clarberg et al. 2005).
 class MapDensity {
  public:
   // importance: height by width, finite, not negative, one at least positive; height at least 2.
@@ -60,9 +60,11 @@ class MapDensity {
     uint32_t row : 28;
     uint32_t log : 4;  // log2 of its side
   };
-  // A block's leaves are consecutive.
-  struct Block {
-    uint32_t first, count;
+  // A square of several leaves: its quarters, left ones first and of those the upper.
+  struct Node {
+    double left;         // share of its left half
+    double upper[2];     // shares of the upper quarters in its halves
+    int32_t quarter[4];  // nodes; of leaves the complement
   };
   // A grid square: index of its first leaf, and log2 of its leaves' side. A leaf larger than the
   // square is shared by all squares that it covers.
@@ -82,23 +84,21 @@ class MapDensity {
   const Leaf& leaf(const Square& square, int column, int row) const;
   double solid_angle(const Leaf& leaf) const;  // [sr]
   double mass(const Leaf& leaf) const;         // integral of the unnormalised density
-  void build_distributions();
-  // Puts the share of the weights before each item in place of its weight; 0 if there are none.
-  static void accumulate(std::span<double> weights, double total);
-  // The items chosen by u among `count` (positive, at most `most`) from `first` on, by the shares
-  // of those before them in their lists; u is rescaled to be uniform again.
-  static wide::Ints choose(std::span<const double> before, const wide::Ints& first,
-                           const wide::Ints& count, uint32_t most, wide::Doubles& u);
+  // The node of the square of this side whose first cell is given, or the complement of its leaf,
+  // and its mass.
+  struct Grown {
+    int32_t node;
+    double mass;
+  };
+  Grown grow(int column, int row, int log);
   class Builder;
 
   int width_, height_, grid_width_;
   std::vector<double> cos_theta_;  // of each row of texels
   HugePageVector<Square> grid_;
   HugePageVector<Leaf> leaves_;
-  std::vector<Block> blocks_;
-  uint32_t most_leaves_ = 0;              // of a block
-  std::vector<double> blocks_before_;     // see choose: of all blocks
-  HugePageVector<double> leaves_before_;  // of the leaves of a block
+  HugePageVector<Node> nodes_;
+  int32_t root_;              // as `quarter`
   double inverse_total_ = 0;  // 1 / integral of the unnormalised density over the sphere
 };
 
