@@ -28,7 +28,8 @@ RadianceEstimator::RadianceEstimator(const Scene& scene, int threads, bool close
       filter_(scene_.film.filter),
       numbers_(numbers),
       glossy_(is_glossy(scene_)),
-      reach_(closed ? 0 : shared_reach(scene_.film, numbers)) {}
+      reach_(closed ? 0 : shared_reach(scene_.film, numbers)),
+      served_(served_pixels(scene_.film)) {}
 
 RadianceEstimator::RadianceEstimator(const Scene& moved, PathChoices& choices, int threads,
                                      Numbers numbers)
@@ -38,7 +39,8 @@ RadianceEstimator::RadianceEstimator(const Scene& moved, PathChoices& choices, i
       filter_(scene_.film.filter),
       numbers_(numbers),
       glossy_(is_glossy(scene_)),
-      reach_(shared_reach(scene_.film, numbers)) {}
+      reach_(shared_reach(scene_.film, numbers)),
+      served_(served_pixels(scene_.film)) {}
 
 void RadianceEstimator::add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const {
   // In closed form what is left to chance is where in its pixel a sample lies: it takes two places.
@@ -115,23 +117,16 @@ void RadianceEstimator::add_shared(std::span<const KeyedSample> samples,
                                    SampleSink& sink) const {
   const FilmRays rays(scene_, camera_, samples, places);
   const auto add = [&](const auto& walks) {
-    const size_t side = 2 * reach_ + 1;
-    Footprint sums{};
+    Footprint footprint;
+    const SharedPlace* place = nullptr;
     for (size_t i = 0; i < samples.size(); ++i) {
-      const PixelSample& at = samples[i].at;
       const Rgb<double>& radiance = walks[i].sums.radiance;
       if (walks[i].failed || !is_finite(radiance)) {
-        sink.reject(at, slot_name(0));
-      } else {
-        for (int c = 0; c < 3; ++c) {
-          const double amount = radiance[c];
-          for (size_t k = 0; k < side * side; ++k) sums[c][k] += places[i]->weights[k] * amount;
-        }
+        sink.reject(samples[i].at, slot_name(0));
+        continue;
       }
-      const bool last = i + 1 == samples.size();
-      if (last || samples[i + 1].at.x != at.x || samples[i + 1].at.y != at.y) {
-        add_footprint(at, sums, sink);
-      }
+      if (places[i] != place) footprint = footprint_of(*(place = places[i]));
+      add_footprint(samples[i].at, *place, footprint, radiance, sink);
     }
   };
   if (sink.log()) {
@@ -142,14 +137,33 @@ void RadianceEstimator::add_shared(std::span<const KeyedSample> samples,
   }
 }
 
-// The sums are zero afterwards.
-void RadianceEstimator::add_footprint(const PixelSample& at, Footprint& sums,
+RadianceEstimator::Footprint RadianceEstimator::footprint_of(const SharedPlace& place) const {
+  Footprint footprint;
+  const size_t side = 2 * reach_ + 1;
+  for (size_t i = 0; i < side * side; ++i) {
+    const size_t mirrored = side - 1 - i % side;
+    for (size_t c = 0; c < 3; ++c) footprint[3 * i + c] = place.weights[i - i % side + mirrored];
+  }
+  return footprint;
+}
+
+// Row by row, where all pixels are served.
+void RadianceEstimator::add_footprint(const PixelSample& at, const SharedPlace& place,
+                                      const Footprint& footprint, const Rgb<double>& radiance,
                                       SampleSink& sink) const {
-  sink.serve(at, reach_, [&](int x, int y, size_t k) {
-    double* const pixel = sink.radiance_at(x, y);
-    for (int c = 0; c < 3; ++c) pixel[c] += sums[c][k];
-  });
-  sums = {};
+  if (!served_.holds(at.x - reach_, at.y - reach_) ||
+      !served_.holds(at.x + reach_, at.y + reach_)) {
+    sink.add_radiance(at, radiance, 1, {&place});
+    return;
+  }
+  const int row = 3 * (2 * reach_ + 1);
+  std::array<double, 3 * SharedPlace::kMostSide> colours;
+  for (int i = 0; i < row; ++i) colours[i] = radiance[i % 3];
+  const double* weights = footprint.data();
+  for (int y = at.y + reach_; y >= at.y - reach_; --y, weights += row) {
+    double* const pixels = sink.radiance_at(at.x - reach_, y);
+    for (int i = 0; i < row; ++i) pixels[i] += weights[i] * colours[i];
+  }
 }
 
 }  // namespace limn

@@ -39,10 +39,12 @@ class RadianceEstimator final : public SampleEstimator {
   template <class Walk>
   void add(const std::vector<Walk>& walks, std::span<const KeyedSample> samples, double weight,
            SampleSink& sink) const;
-  // Weighted sums of a pixel's samples, for the pixels around it.
-  using Footprint =
-      std::array<std::array<double, size_t{SharedPlace::kMostSide} * SharedPlace::kMostSide>, 3>;
-  void add_footprint(const PixelSample& at, Footprint& sums, SampleSink& sink) const;
+  // Weights of a place's pixels, once for each channel: as `SharedPlace::weights`, but the left
+  // ones of a row first, as pixels lie in memory.
+  using Footprint = std::array<double, size_t{3} * SharedPlace::kMostSide * SharedPlace::kMostSide>;
+  Footprint footprint_of(const SharedPlace& place) const;
+  void add_footprint(const PixelSample& at, const SharedPlace& place, const Footprint& footprint,
+                     const Rgb<double>& radiance, SampleSink& sink) const;
 
   const Scene& scene_;
   std::optional<Scene> flat_;  // with the same image, in less time; none: scene_ itself
@@ -52,6 +54,7 @@ class RadianceEstimator final : public SampleEstimator {
   Numbers numbers_;
   bool glossy_;
   int reach_;
+  Tile served_;  // pixels that shared samples serve
 };
 
 }  // namespace limn
