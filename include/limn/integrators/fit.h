@@ -84,8 +84,8 @@ struct FitOptions {
   // The first blur_steps steps take derivatives of the scene with its faces blurred (core/blur.h,
   // kOrdered, shaded flat) in place of exact ones: no gradient of the loss, but 0 in the mean where
   // the image meets the target, and not 0 beside what is near and does not overlap yet. sigma goes
-  // from blur.sigma to sigma_end (0: a hundredth) evenly in its logarithm, gamma as its root. For
-  // scalars and colours; InputError for arrays, lbfgs and faces. 0: none, then with sigma 0.
+  // from blur.sigma to sigma_end (0: a hundredth) evenly in its logarithm, gamma as its root.
+  // InputError for arrays of more than 1024 numbers, lbfgs and faces. 0: none, then with sigma 0.
   int blur_steps = 0;
   Blur blur;
   double sigma_end = 0;

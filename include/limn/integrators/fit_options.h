@@ -93,7 +93,7 @@ void visit_options(Like<FitOptions> auto& o, auto&& visit) {
       o.blur_steps,
       Option{"blur_steps",
              "Take the first N steps with faces blurred, so that objects also move towards targets "
-             "they do not overlap. Needs `sigma`; only scalars and colours",
+             "they do not overlap. Needs `sigma`; arrays of at most 1024 numbers",
              1, 1 << 30}
           .or_zero("none"));
   visit(o.blur.sigma, Option{"sigma",
