@@ -598,8 +598,8 @@ void run_pixel_sample(const SampleEstimator& estimator, uint64_t seed, const Pix
   if (bad.count > 0) log.push_back(bad.message());
 }
 
-bool run_film_sample(const SampleEstimator& estimator, const RunSettings& settings, size_t slot,
-                     int64_t number, SampleLog& log) {
+static bool run_film_sample(const SampleEstimator& estimator, const RunSettings& settings,
+                            size_t slot, int64_t number, SampleLog& log) {
   if (estimator.film_samples(slot) <= 0 || number < 0) return false;
   const auto n = static_cast<size_t>(number);
   const size_t per_sample = FilmBatch(estimator, slot, {}).per_sample;
@@ -618,6 +618,16 @@ bool run_film_sample(const SampleEstimator& estimator, const RunSettings& settin
   }
   log.push_back(fmt::format("{} rays", rays.total()));
   return true;
+}
+
+void run_film_sample(const SampleEstimator& estimator, const RunSettings& settings,
+                     const NonFinite::SampleId& place, SampleLog& log) {
+  for (size_t slot = 0; slot < estimator.slots(); ++slot) {
+    if (estimator.slot_name(slot) != place.term) continue;
+    if (run_film_sample(estimator, settings, slot, place.sample, log)) return;
+  }
+  throw InputError(fmt::format("there is no sample {} of the term \"{}\" on the film", place.sample,
+                               place.term));
 }
 
 }  // namespace limn

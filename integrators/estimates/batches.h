@@ -50,9 +50,9 @@ void check_pixel(const Film& film, const NonFinite::SampleId& place);
 // One sample of a pixel alone: the same whatever the number of samples.
 void run_pixel_sample(const SampleEstimator& estimator, uint64_t seed, const PixelSample& at,
                       SampleLog& log);
-// One of a slot's samples of the film, by its number in the run; false if the run has none of this
-// number.
-bool run_film_sample(const SampleEstimator& estimator, const RunSettings& settings, size_t slot,
-                     int64_t number, SampleLog& log);
+// One of the film's samples of the slot named as the place's term, by its number in the run.
+// InputError if the run has none.
+void run_film_sample(const SampleEstimator& estimator, const RunSettings& settings,
+                     const NonFinite::SampleId& place, SampleLog& log);
 
 }  // namespace limn

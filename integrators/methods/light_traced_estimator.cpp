@@ -14,6 +14,7 @@
 #include <limits>
 
 #include "integrators/paths/camera_path.h"
+#include "integrators/paths/path_log.h"
 #include "integrators/paths/straight_way.h"
 #include "limn/core/error.h"
 #include "limn/core/reverse.h"
@@ -142,11 +143,14 @@ void LightTracedEstimator::add_pixels(std::span<const KeyedSample> samples,
     const PixelSample& at = sample.at;
     const FilmPosition place = sample_pixel_filter(scene_.film, filter_, at.x, at.y, sample.key);
     const CameraRay<double> camera = sample_ray(view_, place, sample.key);
+    if (sink.log()) {
+      log_camera_ray(*sink.log(), place.x, place.y, camera.origin, camera.direction);
+    }
     RayCount rays;
     Rgb<double> radiance;
     bool traced = true;
     try {
-      radiance = trace(camera, view_.forward(), sample.key, rays);
+      radiance = trace(camera, view_.forward(), sample.key, rays, sink.log());
     } catch (const UntraceableRay&) {
       traced = false;
     }
@@ -162,7 +166,7 @@ void LightTracedEstimator::add_pixels(std::span<const KeyedSample> samples,
 
 // Radiance against a camera's ray.
 Rgb<double> LightTracedEstimator::trace(const CameraRay<double>& camera, const Vec3d& forward,
-                                        const Rng& key, RayCount& rays) const {
+                                        const Rng& key, RayCount& rays, SampleLog* log) const {
   Ray ray = camera_ray(scene_, camera);
   Rgb<double> sum, throughput = grey(1.0);
   double pdf = kInfinite, eta = 1;
@@ -193,6 +197,7 @@ Rgb<double> LightTracedEstimator::trace(const CameraRay<double>& camera, const V
     }
     const Scattering<double> scattering(surface, -ray.direction, scene_.shading);
     if (scattering.black()) return sum;
+    if (log) log_vertex(*log, surface, scattering, throughput, bounces);
     place = lights_.at(surface.p);
     // What p_1 is still to divide.
     const double first =
@@ -268,6 +273,16 @@ Rgb<double> LightTracedEstimator::direct(const Surface& surface,
 
 bool LightTracedEstimator::sample_film(size_t, double u, const Rng& key, RayCount& rays,
                                        FilmSample& sample) const {
+  try {
+    return follow_particle(u, key, rays, sample);
+  } catch (const UntraceableRay&) {
+    sample.value[0][0] = std::numeric_limits<double>::quiet_NaN();
+    return true;
+  }
+}
+
+bool LightTracedEstimator::follow_particle(double u, const Rng& key, RayCount& rays,
+                                           FilmSample& sample) const {
   const auto face = std::lower_bound(faces_.begin(), faces_.end() - 1, u,
                                      [](const EmittingFace& f, double x) { return f.upto < x; });
   const Mesh& mesh = scene_.shape(face->face.shape).mesh;
@@ -315,7 +330,9 @@ bool LightTracedEstimator::sample_film(size_t, double u, const Rng& key, RayCoun
       const auto [f, pdf] = front.eval_with_pdf(l);
       if (is_black(f)) return false;
       const Surface from = side_of(scene_, surface, back, w);
-      Ray shadow{from.p, w, 0, distance, from.start()};
+      // Up to the near plane: what is before it is not seen.
+      const double end = distance * (1 - scene_.camera.near_clip / depth);
+      Ray shadow{from.p, w, 0, end, from.start()};
       shadow.skip_emitters = scene_.hide_emitters;
       if (shadow.skip_emitters && surface.shape->is_emitter) return false;
       ++rays.shadow;

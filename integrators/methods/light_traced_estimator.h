@@ -47,7 +47,8 @@ class LightTracedEstimator final : public SampleEstimator {
     return scene_.max_depth >= 0 && bounces + 1 >= scene_.max_depth;
   }
   Rgb<double> trace(const CameraRay<double>& camera, const Vec3d& forward, const Rng& key,
-                    RayCount& rays) const;
+                    RayCount& rays, SampleLog* log) const;
+  bool follow_particle(double u, const Rng& key, RayCount& rays, FilmSample& sample) const;
   Rgb<double> direct(const Surface& surface, const Scattering<double>& scattering,
                      const Lights::Point& place, double reached, int bounces, const Rng& key,
                      RayCount& rays) const;

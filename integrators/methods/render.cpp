@@ -199,10 +199,14 @@ std::vector<std::string> trace_sample(const Scene& scene, const RunSettings& set
   if (options.what == RenderWhat::kDirect) {
     return trace_sample(with_direct_light_alone(scene), settings, place, of_radiance(options));
   }
-  check_pixel(scene.film, place);
   check_still(scene, "the trace of one sample (debug-sample)");
   const auto estimator = make_estimator(scene, settings, options);
   SampleLog log;
+  if (!place.term.empty()) {
+    run_film_sample(*estimator, settings, place, log);
+    return log;
+  }
+  check_pixel(scene.film, place);
   run_pixel_sample(*estimator, settings.seed, {place.x, place.y, place.sample}, log);
   return log;
 }

@@ -131,7 +131,7 @@ class TermJob {
         check_pixel(scene_.film, place);
         run_pixel_sample(pass(p), settings.seed, {place.x, place.y, place.sample}, log);
       } else {
-        trace_film(pass(p), settings, place, log);
+        run_film_sample(pass(p), settings, place, log);
       }
     }
     return log;
@@ -216,16 +216,6 @@ class TermJob {
     std::vector<std::string> names;
     for (const TermType* type : types_) names.emplace_back(type->name);
     return names;
-  }
-
-  void trace_film(const TermEstimator& estimator, const RunSettings& settings,
-                  const NonFinite::SampleId& place, SampleLog& log) const {
-    for (size_t slot = 0; slot < types_.size(); ++slot) {
-      if (types_[slot]->name != place.term) continue;
-      if (run_film_sample(estimator, settings, slot, place.sample, log)) return;
-    }
-    throw InputError(fmt::format("there is no sample {} of the term \"{}\" on the film",
-                                 place.sample, place.term));
   }
 
   void check_samples(const SampleCounts& samples) const {

@@ -99,6 +99,30 @@ TEST(LightTraced, ImagesAreThoseOfPaths) {
   }
 }
 
+// A screen between the camera and its near plane is not seen, and hides nothing from particles.
+TEST(LightTraced, SeesFromTheNearPlaneOn) {
+  const TempFiles files;
+  Scene scenes[2];
+  for (const bool screened : {false, true}) {
+    SceneParts parts;
+    parts.width = parts.height = 8;
+    parts.origin = {0, 2.5, 5};
+    parts.body = square("floor", 2.5, -90, {0, 0, 0}, diffuse("chalk", "0.7, 0.6, 0.5")) +
+                 square("lamp", 0.3, 90, {0.3, 3, 0.5}, area_light("glow", "30")) +
+                 (screened ? square("screen", 0.3, 0, {0, 2.1, 4}, diffuse("grey", "0")) : "");
+    scenes[screened] = make_scene(files, parts);
+    scenes[screened].camera.near_clip = 2;
+  }
+  const Moments open = image_of(scenes[0], "light-traced", 256, 1);
+  const Moments screened = image_of(scenes[1], "light-traced", 256, 1);
+  double sum = 0;
+  for (size_t i = 0; i < open.size(); ++i) {
+    EXPECT_NEAR(screened.mean(i), open.mean(i), 1e-6 + 1e-3 * open.mean(i)) << i;
+    sum += open.mean(i);
+  }
+  EXPECT_GT(sum, 1);
+}
+
 // What paths meet by chance: the caustic of a small light, on the floor below a ball of glass.
 TEST(LightTraced, FindsCausticsOfSmallLights) {
   const TempFiles files;
@@ -120,6 +144,26 @@ TEST(LightTraced, HaveTheSameBitsOnAnyNumberOfThreads) {
   const Moments one = image_of(scene, "light-traced", 4, 3, 1);
   const Moments three = image_of(scene, "light-traced", 4, 3, 3);
   for (size_t i = 0; i < one.size(); ++i) EXPECT_EQ(one.mean(i), three.mean(i));
+}
+
+// As the message of a sample that is not finite asks for.
+TEST(LightTraced, TracesOneParticle) {
+  const TempFiles files;
+  const Scene scene = scene_with(files, diffuse("clay", "0.6, 0.6, 0.6"), true, 0.5);
+  RunSettings settings;
+  settings.spp = 4;
+  RenderOptions options;
+  options.method = Method("light-traced");
+  int on_film = 0;
+  for (int64_t k = 0; k < 64; ++k) {
+    const auto log = trace_sample(scene, settings, {-1, -1, k, "particles"}, options);
+    ASSERT_EQ(log.size(), 2u);
+    on_film += log[0].find("film point") == 0;
+  }
+  EXPECT_GT(on_film, 0);
+  EXPECT_LT(on_film, 64);
+  EXPECT_EQ(trace_sample(scene, settings, {4, 4, 0, ""}, options)[0].find("film position"), 0u);
+  EXPECT_THROW(trace_sample(scene, settings, {-1, -1, 4 * 64, "particles"}, options), InputError);
 }
 
 TEST(LightTraced, RefusesByName) {
