@@ -105,7 +105,7 @@ TEST(BlurredFit, StepsAreSharpAdjointsTimesBlurredDerivatives) {
   const double natural[] = {find_parameter(scene, names[0]).natural_step,
                             find_parameter(scene, names[1]).natural_step};
   Moments found(4);
-  for (uint64_t seed = 0; seed < 256; ++seed) {
+  for (uint64_t seed = 0; seed < 512; ++seed) {
     Fit fit({{scene, target, {}}}, options, settings_of(32, seed));
     const FitRecord record = fit.step().value();
     EXPECT_EQ(record.sigma, blur.sigma);
