@@ -124,7 +124,9 @@ class BlurredPath {
   bool survives(const SurfacePoint<S>& surface, bool front) {
     const Bsdf* bsdf = s_.unmoved().shape(surface.face.shape).bsdf->side(front);
     const double before = albedo_;
-    albedo_ *= bsdf ? std::clamp(bsdf->lobe().albedo, 0.1, 1.0) : 1.0;  // not tuned
+    // The rough lobe's leaves out what is reflected smoothly or passes.
+    const bool rough = bsdf && !bsdf->lobes().smooth && !bsdf->lobes().through;
+    albedo_ *= rough ? std::clamp(bsdf->lobe().albedo, 0.1, 1.0) : 1.0;  // not tuned
     if (ray_.bounces < scene_.rr_depth) return true;
     const double survival = std::min(before, 0.95);
     Rng rng = key_.at(Purpose::kRoulette, ray_.bounces);
