@@ -293,7 +293,7 @@ TEST(BlurredImages, DeriveWhatMovesBehindGlass) {
   CheckOptions options;
   options.method = Method("blurred");
   options.blur = {0.02, 0};
-  for (const auto& [scene, name, spp] : {std::tuple(&still, "glass.eta", 512),
+  for (const auto& [scene, name, spp] : {std::tuple(&still, "glass.eta", 4096),
                                          {&still, "paint.reflectance.data.1.2.g", 256},
                                          {&still, "cube.vertex_positions.3.x", 512},
                                          {&still, "mirror.rotate.y", 512},
