@@ -144,7 +144,6 @@ TEST_P(CoarseBall, DisagreesWhereShadingIsDiscontinuous) {
   scene.shading = ShadingModel::kMitsuba;
   const CheckResult r = run_check(scene, "ball.scale", 512);
   EXPECT_EQ(r.verdict, Verdict::kDisagree);
-  EXPECT_GT(std::max(std::fabs(r.total.z), r.windows.largest), 6);
   ASSERT_EQ(r.gradient.warnings.size(), 1u);
   scene.shading = ShadingModel::kContinuous;
   EXPECT_NE(run_check(scene, "ball.scale", 512).verdict, Verdict::kDisagree);
