@@ -121,7 +121,7 @@ TEST_F(Program, FitsThatBeginBlurredGoOn) {
   const double sigmas[] = {0.04, 0.02, 0.01, 0};
   for (int i = 0; i < 4; ++i) EXPECT_DOUBLE_EQ(history[i]["sigma"], sigmas[i]);
   EXPECT_NE(bytes_of(whole + "/history.csv").find(",halvings,sigma,seconds"), std::string::npos);
-  EXPECT_NE(refused(fit + "4 --wrt lamp.vertex_positions -o " + out()).find("is an array"),
+  EXPECT_NE(refused(fit + "4 --terms interior -o " + out()).find("takes all terms"),
             std::string::npos);
 }
 
