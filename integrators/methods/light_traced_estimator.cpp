@@ -12,8 +12,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "integrators/paths/camera_path.h"
+#include "integrators/paths/path_directions.h"
 #include "integrators/paths/path_log.h"
 #include "integrators/paths/straight_way.h"
 #include "limn/core/error.h"
@@ -23,8 +25,6 @@ namespace limn {
 namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
-
-double luminance(const Rgb<double>& c) { return 0.2126 * c.r + 0.7152 * c.g + 0.0722 * c.b; }
 
 // A drawn direction from a surface.
 struct Drawn {
@@ -40,13 +40,11 @@ std::optional<Drawn> draw(const Scattering<double>& scattering, Rng rng) {
   if (scattering.is_smooth()) {
     const SmoothShares shares = scattering.shares();
     double w = rng.uniform();
-    if (w >= shares.rough) {
-      w -= shares.rough;
-      int k = 0;
-      while (k + 1 < shares.count && w >= shares.ray[k]) w -= shares.ray[k++];
-      if (!(shares.ray[k] > 0)) return {};
-      const SmoothRay<double> ray = scattering.smooth_ray(k);
-      return Drawn{ray.wo, ray.weight * (1 / shares.ray[k]), kInfinite, k, shares.ray[k]};
+    if (const std::optional<int> k = detail::choose_smooth(shares, w)) {
+      const double share = shares.ray[*k];
+      if (!(share > 0)) return {};
+      const SmoothRay<double> ray = scattering.smooth_ray(*k);
+      return Drawn{ray.wo, ray.weight * (1 / share), kInfinite, *k, share};
     }
   }
   const auto wo = scattering.sample(u, v);
@@ -73,7 +71,8 @@ double backward_over_forward(const SurfacePoint<double>& surface, const Scatteri
   const double p = front.pdf_solid_angle(l);
   return p > 0 ? back.pdf_solid_angle(w) * cosine(surface, l) / (p * cosine(surface, w)) : 0;
 }
-// The same of the k-th smooth ray, which both take: eta is that of `front`.
+// The same where both go along their k-th smooth rays: densities are deltas, whose ratio is that of
+// probabilities over the square of eta, here the one of `front`'s ray.
 double backward_over_forward(const SurfacePoint<double>& surface, const Scattering<double>& front,
                              const Scattering<double>& back, int k, double eta) {
   const Vec3d &w = front.wi(), &l = back.wi();
@@ -81,6 +80,12 @@ double backward_over_forward(const SurfacePoint<double>& surface, const Scatteri
   const double bent = std::fabs(dot(front.normal(), w)) * cosine(surface, l) /
                       (std::fabs(dot(back.normal(), l)) * cosine(surface, w));
   return p > 0 ? q / (p * eta * eta) * bent : 0;
+}
+
+// Whether the k-th smooth ray leads towards w: not where an interpolated normal is bent for one of
+// its viewers alone. Ways by light and by camera that do not meet are no ways of one path.
+bool leads_towards(const Scattering<double>& scattering, int k, const Vec3d& w) {
+  return dot(scattering.smooth_ray(k).wo, w) >= 0.999;
 }
 
 }  // namespace
@@ -199,7 +204,7 @@ Rgb<double> LightTracedEstimator::trace(const CameraRay<double>& camera, const V
     if (scattering.black()) return sum;
     if (log) log_vertex(*log, surface, scattering, throughput, bounces);
     place = lights_.at(surface.p);
-    // What p_1 is still to divide.
+    // R without p_1 and the cosine of the first direction.
     const double first =
         bounces > 0 ? 0
                     : per_sample_ / (kPi * on_film(surface, camera.origin, ray.direction, forward));
@@ -213,7 +218,8 @@ Rgb<double> LightTracedEstimator::trace(const CameraRay<double>& camera, const V
     const Scattering<double> back(surface, wo, scene_.shading);
     if (std::isinf(drawn->pdf)) {
       const double bend = scattering.smooth_ray(drawn->ray).eta;
-      reached = bounces == 0 || back.black()
+      const Vec3d& wi = scattering.wi();
+      reached = bounces == 0 || back.black() || !leads_towards(back, drawn->ray, wi)
                     ? 0
                     : reached * backward_over_forward(surface, scattering, back, drawn->ray, bend);
       if (scattering.passes(wo)) eta *= bend;
@@ -291,10 +297,10 @@ bool LightTracedEstimator::follow_particle(double u, const Rng& key, RayCount& r
   const double s = std::sqrt(rng.uniform()), t = rng.uniform();
   const Vec3d point = c[0] * (1 - s) + c[1] * (s * (1 - t)) + c[2] * (s * t);
   const Vec3d n = normalize(cross(c[1] - c[0], c[2] - c[0]));
-  const Vec3d x = normalize(cross(std::fabs(n.x) < 0.5 ? Vec3d{1, 0, 0} : Vec3d{0, 1, 0}, n));
-  const double squared = rng.uniform(), angle = 2 * kPi * rng.uniform();
-  const Vec3d emitted = (x * std::cos(angle) + cross(n, x) * std::sin(angle)) * std::sqrt(squared) +
-                        n * std::sqrt(1 - squared);
+  const double squared = rng.uniform(), radius = std::sqrt(squared);
+  const double angle = 2 * kPi * rng.uniform();
+  const Vec3d local{radius * std::cos(angle), radius * std::sin(angle), std::sqrt(1 - squared)};
+  const Vec3d emitted = Frame(n).to_world(local);
   const Surface light = surface_on_ray<double>(scene_, face->face, point + n, -n);
   Rgb<double> flux = light.emission(emitted, scene_.shading) * (kPi / face->density);
   if (is_black(flux)) return false;
@@ -361,7 +367,7 @@ bool LightTracedEstimator::follow_particle(double u, const Rng& key, RayCount& r
     if (front.black()) return false;
     if (std::isinf(drawn->pdf)) {
       const SmoothRay<double> there = front.smooth_ray(drawn->ray);
-      if (is_black(there.weight) || dot(there.wo, l) < 0.999) return false;
+      if (is_black(there.weight) || !leads_towards(front, drawn->ray, l)) return false;
       const double over = backward_over_forward(surface, front, back, drawn->ray, there.eta);
       reached *= over;
       // The weight over q times the ratio of both deltas, without probabilities.
@@ -372,7 +378,7 @@ bool LightTracedEstimator::follow_particle(double u, const Rng& key, RayCount& r
       reached *= backward_over_forward(surface, front, back);
     }
     if (bounces == 0) first_pdf = std::isinf(drawn->pdf) ? kInfinite : front.pdf_solid_angle(l);
-    if (is_black(flux) || !is_finite(flux)) return false;
+    if (is_black(flux)) return false;
     if (bounces >= scene_.rr_depth) {
       if (own.uniform() >= 0.8) return false;
       flux = flux * (1 / 0.8);

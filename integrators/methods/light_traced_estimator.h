@@ -38,7 +38,7 @@ class LightTracedEstimator final : public SampleEstimator {
 
  private:
   using Surface = SurfacePoint<double>;
-  // Of emission: the density of a point [1/area]; 0 where none is drawn.
+  // The density of points from which particles start [1/area]; 0 on surfaces that emit nothing.
   double emitted_from(const Surface& surface) const;
   // The density of a surface on the film [1/area per pixel^2]. direction: from the camera.
   double on_film(const Surface& surface, const Vec3d& origin, const Vec3d& direction,

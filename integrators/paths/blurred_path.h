@@ -172,12 +172,10 @@ class BlurredPath {
   static std::optional<SmoothRay<S>> draw_smooth(const Scattering<S>& scattering, double u) {
     if (!scattering.is_smooth()) return {};
     const SmoothShares shares = scattering.shares();
-    if (u < shares.rough) return {};
-    u -= shares.rough;
-    int k = 0;
-    while (k + 1 < shares.count && u >= shares.ray[k]) u -= shares.ray[k++];
-    SmoothRay<S> ray = scattering.smooth_ray(k);
-    ray.weight = shares.ray[k] > 0 ? ray.weight * (1 / shares.ray[k]) : Rgb<S>();
+    const std::optional<int> k = detail::choose_smooth(shares, u);
+    if (!k) return {};
+    SmoothRay<S> ray = scattering.smooth_ray(*k);
+    ray.weight = shares.ray[*k] > 0 ? ray.weight * (1 / shares.ray[*k]) : Rgb<S>();
     return ray;
   }
 

@@ -1,6 +1,7 @@
 #pragma once
 // What moves with a direction that a path samples: the scattering function, the solid angle around
 // it, the score of its density. motion: null where directions are held.
+#include <optional>
 #include <type_traits>
 
 #include "integrators/paths/direction_field.h"
@@ -8,6 +9,18 @@
 #include "limn/core/shading.h"
 
 namespace limn::detail {
+
+// The smooth ray that u in [0, 1) chooses; none: the rough lobes, and u becomes uniform again.
+inline std::optional<int> choose_smooth(const SmoothShares& shares, double& u) {
+  if (u < shares.rough) {
+    u /= shares.rough;
+    return {};
+  }
+  double left = u - shares.rough;
+  int k = 0;
+  while (k + 1 < shares.count && left >= shares.ray[k]) left -= shares.ray[k++];
+  return k;
+}
 
 // Whether nothing comes of it: what is black now, as a black surface's light is, may still begin to
 // shine as a parameter grows.

@@ -1,6 +1,7 @@
 #pragma once
 // The path tracer's smooth rays, and what passes surfaces. Included by path_follow.h.
 #include <limits>
+#include <optional>
 
 #include "integrators/paths/path.h"
 #include "integrators/paths/path_directions.h"
@@ -14,16 +15,10 @@ template <class S, class Visitor>
 inline bool PathTracer<S, Visitor>::turns_smoothly(Walk& walk) const {
   if (!walk.scattering->is_smooth()) return false;
   const SmoothShares shares = walk.scattering->shares();
-  double u = walk.u[2];
-  if (u < shares.rough) {
-    walk.u[2] = u / shares.rough;
-    return false;
-  }
-  u -= shares.rough;
-  int k = 0;
-  while (k + 1 < shares.count && u >= shares.ray[k]) u -= shares.ray[k++];
-  walk.smooth_ray = k;
-  walk.smooth_share = shares.ray[k];
+  const std::optional<int> k = detail::choose_smooth(shares, walk.u[2]);
+  if (!k) return false;
+  walk.smooth_ray = *k;
+  walk.smooth_share = shares.ray[*k];
   return true;
 }
 

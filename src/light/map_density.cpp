@@ -273,7 +273,7 @@ MapDensity::Grown MapDensity::grow(int column, int row, int log) {
   return {static_cast<int32_t>(index), left + right};
 }
 
-// Whether u lies below the share; u is rescaled to be uniform again, where `changes`.
+// Whether u is below the share. Where `changes` holds, u becomes its place in that part, in [0, 1).
 LIMN_WIDE wide::Mask is_below(const wide::Doubles& share, const wide::Mask& changes,
                               wide::Doubles& u) {
   const wide::Mask below = u < share;
@@ -293,6 +293,7 @@ MapDensity::Drawn MapDensity::sample(const wide::Doubles& u1, const wide::Double
     if (!any) break;
     const auto node = [&](int i) -> const Node& { return nodes_[inner(i) ? at[i] : 0]; };
     const Mask changes = __builtin_convertvector(at >= 0, Mask);
+    // Masks are -1 where they hold, 0 elsewhere.
     const Mask left = is_below(gather([&](int i) { return node(i).left; }), changes, along);
     const Mask upper =
         is_below(gather([&](int i) { return node(i).upper[left[i] + 1]; }), changes, down);

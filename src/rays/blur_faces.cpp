@@ -29,7 +29,8 @@ bool is_closed(const Mesh& mesh) {
   });
 }
 
-// Whether x, in the plane of a face with this normal, is in it, and far from its sides. Most are.
+// Whether the point x of the face's plane lies in the face, farther than `far` from all its sides.
+// n: the face's normal, of any length.
 bool is_deep(const std::array<Vec3d, 3>& corners, const Vec3d& n, const Vec3d& x, double far) {
   const double squared = far * far * dot(n, n);
   for (int k = 0; k < 3; ++k) {

@@ -123,7 +123,7 @@ TEST(LightTraced, SeesFromTheNearPlaneOn) {
   EXPECT_GT(sum, 1);
 }
 
-// What paths meet by chance: the caustic of a small light, on the floor below a ball of glass.
+// The caustic of a small light on the floor below a ball of glass, which paths meet by chance.
 TEST(LightTraced, FindsCausticsOfSmallLights) {
   const TempFiles files;
   const Scene scene = scene_with(files, R"(<bsdf type="dielectric"/>)", true, 0.05, "", true);
