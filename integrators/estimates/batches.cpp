@@ -233,7 +233,7 @@ class BatchRunner {
   static constexpr size_t kChunk = 1024;  // not tuned
 
   void run_film(size_t slot) {
-    constexpr size_t kHeld = 1024 * kChunk;  // samples in memory, 220 bytes each; not tuned
+    constexpr size_t kHeld = 1024 * kChunk;  // samples in memory, 304 bytes each; not tuned
     const FilmBatch batch(estimator_, slot, batch_);
     for (size_t begin = 0; begin < batch.count && !progress_.stopped(); begin += kHeld) {
       add_film_samples(slot, batch, begin, std::min(batch.count, begin + kHeld));
@@ -275,7 +275,8 @@ class BatchRunner {
       const FilmDraw draw = batch.draw(estimator_, slot, batch_, i);
       if (!estimator_.sample_film(slot, draw.u, draw.key, rays, sample)) continue;
       if (is_finite(sample.value) && is_finite(sample.along_x) && is_finite(sample.along_y) &&
-          is_finite(sample.amount)) {
+          is_finite(sample.amount) && is_finite(sample.radiance) &&
+          is_finite(grey(sample.moves.x)) && is_finite(grey(sample.moves.y))) {
         chunk.samples.emplace_back(batch.first + i, sample);
       } else {
         chunk.bad.add({-1, -1, static_cast<int64_t>(batch.first + i), estimator_.slot_name(slot)});
@@ -295,10 +296,22 @@ class BatchRunner {
   // as in the pixel that it lies in.
   void splat(size_t slot, const FilmSample& sample, double scale) {
     const Rgb<Lanes> own = own_value(sample);
+    const bool is_particle = !is_black(sample.radiance);
     for_every_pixel_of(film_, sample.x, sample.y, [&](int x, int y, double weight) {
+      if (is_particle) return add_particle(slot, x, y, sample, weight * scale);
       const bool shared = reach_ > 0 && served_.holds(x, y);
       add(slot, pixel_index(film_, x, y), shared ? own : value_for(x, y, sample), weight * scale);
     });
+  }
+  // The pixel's filter weighs its light, and less or more as it moves.
+  void add_particle(size_t slot, int x, int y, const FilmSample& sample, double weight) {
+    const size_t index = pixel_index(film_, x, y);
+    for (int c = 0; c < 3; ++c) sums_.radiance[index + c] += sample.radiance[c] * weight;
+    const Lanes by_motion = sample.moves.x * log_slope(film_.filter, sample.x - (x + 0.5)) +
+                            sample.moves.y * log_slope(film_.filter, sample.y - (y + 0.5));
+    Rgb<Lanes> value = sample.value;
+    for (int c = 0; c < 3; ++c) value[c] += by_motion * sample.radiance[c];
+    add(slot, index, value, weight);
   }
 
   Rgb<Lanes> value_for(int x, int y, FilmSample sample) const {

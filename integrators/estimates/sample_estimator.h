@@ -64,7 +64,7 @@ inline FilmMotion tapered(const FilmMotion& motion, const Film& film, int px, in
 // Of a pixel of the full film; null where its positions are held.
 using FilmMotionAt = std::function<const FilmMotion*(int x, int y)>;
 
-// A point on a curve of the film across which radiance is discontinuous.
+// A point on a curve of the film across which radiance is discontinuous, or a particle.
 struct FilmSample {
   double x, y;       // film position [pixels]
   Rgb<Lanes> value;  // difference times the curve's normal speed [pixels per unit of parameter],
@@ -74,6 +74,9 @@ struct FilmSample {
   // What turns of directions at the first vertex add (DirectionField::turn): amount times this.
   Rgb<double> amount{};
   Vec3d per_turn{};
+  // Of a particle: its light, of which `value` is the derivative, and how its position moves.
+  Rgb<double> radiance{};
+  FilmMotion moves{};
 
   void move(const FilmMotion& motion) {
     for (int c = 0; c < 3; ++c) value[c] += motion.x * -along_x[c] + motion.y * -along_y[c];

@@ -268,9 +268,10 @@ bool Fit::Impl::add_view(size_t view, FitRecord& record,
   const double share = 1 / static_cast<double>(views.size());
   RunSettings own = view_settings(view);
   own.spp = samples_of(options_.loss_spp > 0 ? options_.loss_spp : settings_.spp);
-  const LossOptions loss_options{options_.loss, options_.pyramid,
-                                 loss_method(options_.backward.method), options_.backward.points,
-                                 is_exact()};
+  const LossOptions loss_options{
+      options_.loss, options_.pyramid,
+      options_.blur.particles ? Method("light-traced") : loss_method(options_.backward.method),
+      options_.backward.points, is_exact()};
   LossResult loss = image_loss(v.scene, v.target, loss_options, own, v.mask);
   if (loss.spp < own.spp) return false;
   record.view_losses.push_back(loss.value);

@@ -73,7 +73,7 @@ Blur Fit::Impl::blur() const {
   const double last = options_.sigma_end > 0 ? options_.sigma_end : first.sigma / 100;
   const double part = static_cast<double>(steps) / std::max(1, options_.blur_steps - 1);
   const double factor = std::pow(last / first.sigma, part);
-  return {first.sigma * factor, first.gamma * std::sqrt(factor)};
+  return {first.sigma * factor, first.gamma * std::sqrt(factor), first.weights, first.particles};
 }
 
 bool Fit::Impl::add_blurred(size_t view, const Image& adjoint, const RunSettings& settings,

@@ -4,14 +4,25 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 
 #include "integrators/paths/blurred_path.h"
 #include "integrators/paths/camera_path.h"
 #include "integrators/paths/path_log.h"
+#include "limn/core/error.h"
 #include "limn/core/exposure.h"
 
 namespace limn {
 namespace {
+
+// As they move, pixels gain and lose particles by the slope of their filters.
+void check_moving_particles(const Scene& scene) {
+  const Film& film = scene.film;
+  if (film.filter.kind != Filter::Kind::kBox && film.sample_border) return;
+  throw InputError(film.where,
+                   "derivatives by particles need a filter that ends nowhere at once: tent or "
+                   "gaussian, with sample_border");
+}
 
 std::shared_ptr<const Scene> seeded(const Scene& scene, std::span<const BlurredNumber> derived,
                                     const std::optional<double>& time) {
@@ -32,8 +43,10 @@ BlurredEstimator::BlurredEstimator(const Scene& scene, const Blur& blur,
     : scene_((check_blurred(scene), seeded(scene, derived, time))),
       lanes_(static_cast<int>(derived.size())),
       blurred_(*scene_, blur, threads),
+      particles_(blurred_),
       filter_(scene_->film.filter),
       numbers_(numbers) {
+  if (lanes_ > 0 && !particles_.empty()) check_moving_particles(scene);
   for (int k = 0; k < lanes_; ++k) lane_scale_[k] = derived[k].parameter.natural_step;
 }
 
@@ -41,6 +54,7 @@ BlurredEstimator::BlurredEstimator(const Scene& moved, const BlurredScene& unmov
                                    Numbers numbers)
     : scene_(std::shared_ptr<const Scene>(), &moved),
       blurred_(moved, unmoved.blur(), threads, &unmoved),
+      particles_(blurred_),
       filter_(scene_->film.filter),
       numbers_(numbers) {}
 
@@ -80,6 +94,17 @@ void BlurredEstimator::add_pixels(std::span<const KeyedSample> samples, SampleSi
   } else {
     const CameraView<double> view(scene_->camera);
     for (const KeyedSample& sample : samples) add(sample, view, sink);
+  }
+}
+
+bool BlurredEstimator::sample_film(size_t, double u, const Rng& key, RayCount& rays,
+                                   FilmSample& sample) const {
+  try {
+    return lanes_ > 0 ? particles_.follow<Dual>(u, key, rays, sample)
+                      : particles_.follow<double>(u, key, rays, sample);
+  } catch (const UntraceableRay&) {
+    sample.radiance.r = std::numeric_limits<double>::quiet_NaN();
+    return true;
   }
 }
 

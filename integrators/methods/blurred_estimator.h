@@ -4,7 +4,7 @@
 #include <span>
 
 #include "integrators/estimates/sample_estimator.h"
-#include "integrators/paths/blurred_scene.h"
+#include "integrators/paths/blurred_particles.h"
 #include "limn/core/parameter.h"
 
 namespace limn {
@@ -32,6 +32,9 @@ class BlurredEstimator final : public SampleEstimator {
   Lanes lane_scale() const override { return lane_scale_; }
   Numbers numbers() const override { return numbers_; }
   void add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const override;
+  double film_samples(size_t) const override { return particles_.empty() ? 0 : 1; }
+  bool sample_film(size_t slot, double u, const Rng& key, RayCount& rays,
+                   FilmSample& sample) const override;
 
  private:
   template <class S>
@@ -41,6 +44,7 @@ class BlurredEstimator final : public SampleEstimator {
   int lanes_ = 0;
   Lanes lane_scale_;
   BlurredScene blurred_;
+  BlurredParticles particles_;
   FilterTable filter_;
   Numbers numbers_;
 };

@@ -41,6 +41,11 @@ inline std::vector<MethodType> other_methods() {
            .image = ImageMethod{.looks_around = true}},
           {.name = "blurred",
            .description = "a scene of blurred faces: smooth, biased for the sharp one",
+           .settings = {{"caustics",
+                         "of area lights, on what the camera sees: by paths from the camera, or "
+                         "by particles from the lights",
+                         {"paths", "particles"}}},
+           .set_up = [](MethodType& row) { row.particles = row.settings["caustics"] != "paths"; },
            .terms = {"blurred"},
            .blurs = BlurWeights::kOrdered,
            .biased = true,

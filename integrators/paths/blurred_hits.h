@@ -20,6 +20,8 @@ struct BlurredRay {
   int bounces = 0;         // before it
   double pdf = 0;          // of its direction [1/sr]; 0 of the camera's and of smooth rays
   Lights::Point lights{};  // where it starts
+  // The first vertex was rough, and all others were smooth.
+  bool caustic = false;
 };
 
 template <class S>
@@ -38,6 +40,7 @@ class BlurredHits {
     while (k + 1 < met && u >= value(weights_[k])) u -= value(weights_[k++]);
     return k;
   }
+  const S& weight(size_t k) const { return weights_[k]; }
   Face face(size_t k) const { return k < hits_.size() ? Face(hits_[k].face) : Face(); }
 
   // Another surface j than k, by the size of dw_j. weight: dw_j over its density.

@@ -70,7 +70,8 @@ class BlurredPath {
     const auto drawn = hits_.draw_other(k, lane_scale_, key_.at(Purpose::kDirect, ray_.bounces));
     if (!drawn) return;
     const BlurredRay<double> ray{value(ray_.origin), value(ray_.direction), 0,        ray_.t_max,
-                                 ray_.start,         ray_.bounces,          ray_.pdf, ray_.lights};
+                                 ray_.start,         ray_.bounces,          ray_.pdf, ray_.lights,
+                                 ray_.caustic};
     BlurredPath<double> path(s_, key_, lane_scale_, rays_);
     const Rgb<double> other = path.leaving(ray, hits_.face(drawn->j), albedo_);
     pairs_.push_back({drawn->weight, value(throughput_) * other, value(sum_)});
@@ -105,7 +106,8 @@ class BlurredPath {
     const Vec3d wo = value(ray_.direction);
     const Rgb<S> radiance = detail::emission<S>(surface, -wo, scene_.shading);
     if (detail::stays_black(radiance)) return {};
-    if (ray_.pdf == 0) return radiance;
+    // Of caustics, particles find it (blurred_particles.h).
+    if (ray_.pdf == 0) return s_.blur().particles && ray_.caustic ? Rgb<S>() : radiance;
     const double distance = length(value(surface.p) - value(ray_.origin));
     return radiance * share_seen(s_.lights().pdf(ray_.lights, surface.face.shape,
                                                  {wo, distance, surface.n_g}));
@@ -151,6 +153,7 @@ class BlurredPath {
     const double u = rng.uniform(), v = rng.uniform();
     if (const auto smooth = draw_smooth(scattering, rng.uniform())) {
       next.direction = smooth->wo;
+      next.caustic = ray_.caustic;
       throughput_ = throughput_ * smooth->weight;
       ray_ = next;
       return !detail::stays_black(smooth->weight);
@@ -162,6 +165,7 @@ class BlurredPath {
     throughput_ = throughput_ * f * (1 / pdf);
     next.direction = detail::moving<S>(*wo, nullptr);
     next.pdf = pdf;
+    next.caustic = ray_.bounces == 0;
     const bool last = is_complete(next.bounces);
     ray_ = next;
     return !last || (ordered() && (s_.lights().on_shapes() || scene_.environment));

@@ -395,6 +395,7 @@ class Start:
     # Of a start that overlaps its target: defines, and the truth's values from there.
     near: tuple = ()
     steps: int = 60
+    caustic: bool = False  # particles find it
     options: str = "--spp 4 --step 4 --step-half-life 20 --snapshots 5"
 
 
@@ -403,6 +404,7 @@ def moves(name, axes):
 
 
 VIEW_OF_FLOOR = ["y=1.9", "look=0"]
+OVER_LAMP = ["mesh=OUT/pane.obj", "ior=3", "y=2.6", "lamp_y=1.4", "lamp_angle=-90", "glow=8000"]
 REGULARISED = {
     "albedos": Start("room", [f"{c}.reflectance" for c in ("white", "red", "green", "grey")], 0.01,
                      [f"{c}=0.4, 0.4, 0.4" for c in ("white", "red", "green", "grey")]),
@@ -432,6 +434,12 @@ REGULARISED = {
                      ["paint=OUT/paint.png"],
                      options="--spp 4 --step 20 --step-half-life 20 --snapshots 5"),
     "index": Start("pane", ["glass.eta"], 0.04, ["ior=1.1"], ["ior=1.9"], [1.9], 0.8, (["ior=1.8"], [1.9]), 90),
+    "caustic index": Start("lens", ["glass.eta"], 0.01, ["ior=1.15"], ["ior=1.5"], [1.5], 0.35,
+                             (["ior=1.45"], [1.5]), caustic=True),
+    "caustic place": Start("lens", moves("pane", "xz"), 0.05, [*OVER_LAMP, "x=0.25"],
+                           [*OVER_LAMP, "x=-0.25", "z=0.1"], [-0.5, 0.1], 0.51,
+                           ([*OVER_LAMP, "x=-0.2", "z=0.1"], [-0.05, 0]), caustic=True,
+                           options="--spp 16 --step 12 --step-half-life 20 --snapshots 5"),
     "vertices": Start("torus", ["torus.vertex_positions"], 0.4, ["mesh=OUT/cube.obj", "x=0.9"],
                       ["mesh=OUT/rough.obj", "x=-0.9"], [], 0,
                       (["mesh=OUT/cube.obj", "x=-0.9"], []), 150,
@@ -447,6 +455,10 @@ def regularised_files(fits):
 
     points, faces = torus(168)
     write_obj(fits.path("torus.obj"), 0.5 * points, faces)
+    points = np.array([[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1], [0, 0.5, 0]]) * 0.5
+    faces = np.array([(0, 1, 2), (0, 2, 3), (0, 4, 1), (1, 4, 2), (2, 4, 3), (3, 4, 0)])
+    write_obj(fits.path("lens.obj"), points, faces)
+    write_obj(fits.path("pane.obj"), 0.2 * points[:4], faces[:2])
     cube = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * 0.35
     sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     faces = np.array([f for a, b, c, d in sides for f in ((a, b, c), (a, c, d))])
@@ -461,23 +473,27 @@ def regularised_files(fits):
 def regularised(fits, _):
     """After Quinn 2021, Sec. 5.2 and 5.4: exact gradients, a pyramid, and blurred first steps."""
     regularised_files(fits)
-    mesh = ["mesh=OUT/torus.obj", "format=obj"]
+    meshes = {name: [f"mesh=OUT/{mesh}.obj", "format=obj"] for name, mesh in
+              (("torus", "torus"), ("../fits/two_mirrors", "torus"), ("lens", "lens"))}
     rows = []
     for name in fits.chosen(REGULARISED):
         s, found = REGULARISED[name], []
         # The last of several defines counts.
         start, truth, near = (
             [d.replace("OUT", os.path.abspath(fits.out)) for d in
-             (mesh if s.scene in ("torus", "../fits/two_mirrors") else []) + own]
+             meshes.get(s.scene, []) + own]
             for own in (s.start, s.truth, s.near[0] if s.near else []))
         base = f"../regularised/{s.scene}"
-        target = fits.render(base, f"regularised_{name.replace(' ', '_')}.exr", truth)
-        blur = f"--sigma {s.sigma} --blur-steps {s.steps * 2 // 3}"
+        target = fits.render(base, f"regularised_{name.replace(' ', '_')}.exr", truth,
+                             "--spp 1024 --method light-traced" if s.caustic else "--spp 256")
+        # Exact steps find caustics by paths alone.
+        blur = f"--sigma {s.sigma} --blur-steps {s.steps if s.caustic else s.steps * 2 // 3}"
         first = None
-        for variant, more in (("exact", ""), ("pyramid", "--pyramid 5"), ("blurred", blur),
-                              ("good start", "")):
+        image = "--caustics particles" if s.caustic else ""
+        for variant, more in (("exact", image), ("pyramid", f"--pyramid 5 {image}"), ("blurred", blur),
+                              ("particles", f"{blur} {image}"), ("good start", image)):
             ends = []
-            if variant == "good start" and not s.near:
+            if not {"good start": s.near, "particles": s.caustic}.get(variant, True):
                 continue
             for seed in (1, 2, 3):
                 fit = fits.fit(folder_of(name, f"{variant} {seed}"), base, [target], s.steps,
@@ -488,8 +504,8 @@ def regularised(fits, _):
                 goal = s.near[1] if variant == "good start" else s.goal
                 ends.append(_end(fit, goal, s.far, first))
             found.append(" ".join(ends))
-        rows.append([name, *found, *[""] * (4 - len(found))])
-    return ["fit", "exact", "pyramid", "blurred", "exact, good start"], rows
+        rows.append([name, *found, *[""] * (5 - len(found))])
+    return ["fit", "exact", "pyramid", "blurred", "particles or good start", "good start"], rows
 
 
 def bad_starts(fits, _):

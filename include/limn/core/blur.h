@@ -23,6 +23,7 @@ struct Blur {
   double sigma = 0;  // square of the width over which sides fade [scene units squared]
   double gamma = 0;  // depth over which surfaces mix [scene units]
   BlurWeights weights = BlurWeights::kOrdered;
+  bool particles = false;  // caustics of area lights by particles (blurred_particles.h)
 
   // How far faces extend beyond their sides [scene units]; as far inside they are opaque.
   double reach() const;

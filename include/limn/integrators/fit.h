@@ -86,6 +86,7 @@ struct FitOptions {
   // the image meets the target, and not 0 beside what is near and does not overlap yet. sigma goes
   // from blur.sigma to sigma_end (0: a hundredth) evenly in its logarithm, gamma as its root.
   // InputError for arrays of more than 1024 numbers, lbfgs and faces. 0: none, then with sigma 0.
+  // blur.particles: the loss's images are by light-traced, blurred or not.
   int blur_steps = 0;
   Blur blur;
   double sigma_end = 0;

@@ -6,6 +6,7 @@
 namespace limn {
 
 inline constexpr const char* kPixels[] = {"adjoint", "uniform"};
+inline constexpr const char* kCaustics[] = {"paths", "particles"};
 inline constexpr Option kLossOption = choice("loss", kLosses, "Loss: l2, relative-l2 or l1");
 inline constexpr Option kPyramidOption{
     "pyramid",
@@ -109,6 +110,10 @@ void visit_options(Like<FitOptions> auto& o, auto&& visit) {
                              "units; proportional to the root of sigma",
                              1e-15L, 1e15L}
                           .or_zero("none"));
+  visit(o.blur.particles,
+        choice("caustics", kCaustics,
+               "Caustics of area lights in the images of the loss and in the blurred steps: by "
+               "paths from the camera, or by particles from the lights"));
   visit(o.loss_spp, Option{"loss_spp",
                            "Samples per pixel of each of the two images from which the loss is "
                            "computed",

@@ -47,6 +47,7 @@ struct MethodType {
   bool closed_light = false;                        // it takes GradientOptions::points
   bool warps = false;                               // it takes GradientOptions::warp
   std::optional<BlurWeights> blurs = std::nullopt;  // its faces are blurred: it takes a Blur
+  bool particles = false;                           // Blur::particles
   bool biased = false;  // its mean is not the derivative, however many samples it takes
   // InputError, with the place, for a scene that the method cannot take; null: it takes all.
   void (*check)(const Scene&) = nullptr;
@@ -63,9 +64,10 @@ struct MethodType {
 
   bool can(Task task) const;
   bool is_variant() const { return !settings.text().empty(); }
-  // With the weights of a method that blurs.
+  // With the weights of a method that blurs, and its way to caustics.
   Blur blurred_by(Blur blur) const {
     blur.weights = *blurs;
+    blur.particles = particles;
     return blur;
   }
 };
