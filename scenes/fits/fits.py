@@ -436,7 +436,7 @@ REGULARISED = {
     "index": Start("pane", ["glass.eta"], 0.04, ["ior=1.1"], ["ior=1.9"], [1.9], 0.8, (["ior=1.8"], [1.9]), 90),
     "caustic index": Start("lens", ["glass.eta"], 0.01, ["ior=1.15"], ["ior=1.5"], [1.5], 0.35,
                              (["ior=1.45"], [1.5]), caustic=True),
-    "caustic place": Start("lens", moves("pane", "xz"), 0.05, [*OVER_LAMP, "x=0.25"],
+    "caustic place": Start("lens", moves("pane", "xz"), 0.1, [*OVER_LAMP, "x=0.25"],
                            [*OVER_LAMP, "x=-0.25", "z=0.1"], [-0.5, 0.1], 0.51,
                            ([*OVER_LAMP, "x=-0.2", "z=0.1"], [-0.05, 0]), caustic=True,
                            options="--spp 16 --step 12 --step-half-life 20 --snapshots 5"),

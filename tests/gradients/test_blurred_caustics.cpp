@@ -6,6 +6,7 @@
 
 #include "limn/core/error.h"
 #include "limn/integrators/check.h"
+#include "limn/integrators/fit.h"
 #include "limn/integrators/gradient.h"
 #include "limn/integrators/render.h"
 #include "limn/integrators/statistics.h"
@@ -115,7 +116,8 @@ TEST(BlurredCaustics, DerivativesAreThoseOfPaths) {
 
 // All light comes by the body: a window over the whole floor, or a mirror over a lamp that faces
 // up.
-Scene scene_by(const std::string& body, double lamp_angle, const Vec3d& lamp) {
+Scene scene_by(const std::string& body, double lamp_angle, const Vec3d& lamp, double size = 0.3,
+               double radiance = 20) {
   SceneParts parts;
   parts.max_depth = 3;
   parts.width = parts.height = 8;
@@ -123,8 +125,9 @@ Scene scene_by(const std::string& body, double lamp_angle, const Vec3d& lamp) {
   parts.target = {0, 0.2, 0};
   parts.fov = 35;
   parts.film = kTent;
-  parts.body = square("floor", 2.5, -90, {0, 0, 0}, diffuse("chalk", "0.7, 0.6, 0.5")) + body +
-               square("lamp", 0.3, lamp_angle, lamp, area_light("glow", "20"));
+  parts.body =
+      square("floor", 2.5, -90, {0, 0, 0}, diffuse("chalk", "0.7, 0.6, 0.5")) + body +
+      square("lamp", size, lamp_angle, lamp, area_light("glow", fmt::format("{}", radiance)));
   return scene_of_text(scene_text(parts));
 }
 
@@ -156,6 +159,32 @@ TEST(BlurredCaustics, DerivativesAreThoseOfImages) {
     EXPECT_GT(std::erfc(std::fabs(result.total.z) / std::sqrt(2)), kLevel) << name;
     EXPECT_NE(result.total.gradient, 0) << name;
   }
+}
+
+// The place of a mirror whose light on the floor does not overlap its target.
+TEST(BlurredCaustics, LeadFitsToTheirTargets) {
+  constexpr double kFar = 0.5;
+  const auto mirror_at = [](double x) {
+    const std::string glass = R"(<bsdf type="dielectric"><float name="int_ior" value="3"/></bsdf>)";
+    return scene_by(square("body", 0.1, 90, {x, 2.6, 0}, glass), -90, {0, 1.4, 0}, 0.05, 2000);
+  };
+  RenderOptions by_particles;
+  by_particles.method = Method("light-traced");
+  const Scene truth = mirror_at(-kFar / 2);
+  const Moments m = render(truth, run_settings(1024, 1), by_particles).radiance;
+  Image target(truth.film.crop_width, truth.film.crop_height, 3);
+  for (size_t i = 0; i < m.size(); ++i) target.data[i] = static_cast<float>(m.mean(i));
+  FitOptions options;
+  options.parameters = {"body.translate.x"};
+  options.blur = {0.1, 0, BlurWeights::kOrdered, true};
+  options.blur_steps = 60;
+  options.step = 12;
+  options.step_half_life = 20;
+  Fit fit({{mirror_at(kFar / 2), target, {}}}, options, run_settings(64, 2));
+  std::vector<double> end;
+  for (int i = 0; i < 60; ++i) end = fit.step()->values;
+  fmt::print("{:.3f} of {:.3f}\n", end[0], -kFar);
+  EXPECT_LT(std::fabs(end[0] + kFar), kFar / 4);
 }
 
 TEST(BlurredCaustics, HaveTheSameBitsOnAnyNumberOfThreads) {
