@@ -100,7 +100,6 @@ TEST(BlurredCaustics, ImagesAreThoseOfPaths) {
 }
 
 TEST(BlurredCaustics, DerivativesAreThoseOfPaths) {
-  const TempFiles files;
   const Scene scene = scene_with(sheet());
   const std::vector<std::string> names{"body.translate.x", "body.translate.y",  "body.rotate.x",
                                        "glass.eta",        "lamp.translate.x",  "lamp.rotate.z",
@@ -188,7 +187,6 @@ TEST(BlurredCaustics, LeadFitsToTheirTargets) {
 }
 
 TEST(BlurredCaustics, HaveTheSameBitsOnAnyNumberOfThreads) {
-  const TempFiles files;
   const Scene scene = scene_with(sheet());
   const auto one = gradient_of(scene, {"glass.eta"}, kParticles, 4, 11, 1);
   const auto three = gradient_of(scene, {"glass.eta"}, kParticles, 4, 11, 3);
@@ -199,7 +197,6 @@ TEST(BlurredCaustics, HaveTheSameBitsOnAnyNumberOfThreads) {
 }
 
 TEST(BlurredCaustics, RefuseFiltersThatJump) {
-  const TempFiles files;
   const auto refusal = [&](const std::string& film) -> std::string {
     const Scene scene = scene_with(sheet(), 0.5, film);
     image_of(scene, kParticles, 1, 1);
