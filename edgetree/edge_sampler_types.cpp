@@ -42,7 +42,7 @@ Settings forest_settings() {
 }
 
 std::unique_ptr<EdgeSampler> make_forest(const Settings& settings, const EdgeSamplerInput& input,
-                                         int threads) {
+                                         int threads, SharedObjects* shared) {
   ForestConfig config;
   config.width = static_cast<uint32_t>(std::stoi(settings["width"]));
   const std::string& ahead = settings["look-ahead"];
@@ -56,11 +56,11 @@ std::unique_ptr<EdgeSampler> make_forest(const Settings& settings, const EdgeSam
   config.cull_concave = !settings.on("concave");
   config.light_term = settings.on("lights");
   config.environment_term = settings.on("environment");
-  return EdgeForest::build(input, threads, config);
+  return EdgeForest::build(input, threads, config, shared);
 }
 
 std::unique_ptr<EdgeSampler> make_quadric(const Settings& settings, const EdgeSamplerInput& input,
-                                          int threads) {
+                                          int threads, SharedObjects*) {
   QuadricConfig config;
   config.quadrics = settings.on("quadrics");
   config.light_term = settings.on("lights");
@@ -69,18 +69,19 @@ std::unique_ptr<EdgeSampler> make_quadric(const Settings& settings, const EdgeSa
 }
 
 std::unique_ptr<EdgeSampler> make_li2019(const Settings& settings, const EdgeSamplerInput& input,
-                                         int) {
+                                         int, SharedObjects*) {
   return make_li2019_sampler(input, settings["sphere"] == "solid");
 }
 
 std::unique_ptr<EdgeSampler> make_brute_force(const Settings& settings,
-                                              const EdgeSamplerInput& input, int threads) {
+                                              const EdgeSamplerInput& input, int threads,
+                                              SharedObjects*) {
   return settings["search"] == "list" ? make_brute_force_sampler(input, threads)
                                       : make_dual_bvh_sampler(input, threads);
 }
 
 std::unique_ptr<EdgeSampler> make_uniform(const Settings&, const EdgeSamplerInput& input,
-                                          int threads) {
+                                          int threads, SharedObjects*) {
   return make_uniform_sampler(input, threads);
 }
 

@@ -136,7 +136,7 @@ EdgeForest::EdgeForest(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 EdgeForest::~EdgeForest() = default;
 
 std::unique_ptr<EdgeForest> EdgeForest::build(const EdgeSamplerInput& input, int threads,
-                                              const ForestConfig& config) {
+                                              const ForestConfig& config, SharedObjects* shared) {
   // An environment that is not uniform has its own weight.
   const bool spread = config.environment_term && input.environment;
   const double uniform_luminance = spread ? 0 : input.environment_luminance;
@@ -149,7 +149,7 @@ std::unique_ptr<EdgeForest> EdgeForest::build(const EdgeSamplerInput& input, int
   auto impl = std::unique_ptr<Impl>(new Impl{input,
                                              config,
                                              LightClusters(input.lights, uniform_luminance),
-                                             build_forest(input, threads, config),
+                                             build_forest(input, threads, config, shared),
                                              crossings,
                                              {},
                                              {}});

@@ -10,11 +10,15 @@
 
 namespace limn {
 
+struct SharedObjects;  // edge_sampler_types.h
+
 class EdgeForest final : public EdgeSampler {
  public:
-  // The input must outlive the forest. The result does not depend on `threads`.
+  // The input must outlive the forest. The result does not depend on `threads`, nor on `shared`,
+  // which must always come with the same configuration.
   static std::unique_ptr<EdgeForest> build(const EdgeSamplerInput& input, int threads,
-                                           const ForestConfig& config = {});
+                                           const ForestConfig& config = {},
+                                           SharedObjects* shared = nullptr);
   ~EdgeForest() override;
 
   std::optional<EdgeSample> sample(const EdgeQuery& query, Rng& rng) const override;

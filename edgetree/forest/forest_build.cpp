@@ -304,6 +304,45 @@ Tree tree_of(NodeId root, const Wedge& stand_in, bool of_texture, const Forest& 
           2 * of_texture + (stand_in.speed > 0)};
 }
 
+// A tree that is kept for other forests: its nodes, where they were in the first.
+struct KeptTree {
+  NodeId inner_begin, edges_begin;
+  std::vector<InnerNode> inner;
+  std::vector<EdgeNode> edges;
+  Wedge stand_in;
+};
+
+// The nodes of a forest from these on.
+KeptTree kept_tree(const Forest& forest, NodeId inner, NodeId edges, const Wedge& stand_in) {
+  return {inner,
+          edges,
+          {forest.inner.begin() + inner, forest.inner.end()},
+          {forest.edges.begin() + edges, forest.edges.end()},
+          stand_in};
+}
+
+// Appends a tree whose object has this motion; returns its root.
+NodeId append_kept(const KeptTree& tree, uint32_t motion, Forest& forest) {
+  const auto inner = static_cast<NodeId>(forest.inner.size());
+  const auto edges = static_cast<NodeId>(forest.edges.size());
+  forest.inner.insert(forest.inner.end(), tree.inner.begin(), tree.inner.end());
+  forest.edges.insert(forest.edges.end(), tree.edges.begin(), tree.edges.end());
+  std::vector<NodeId> ids;
+  for (auto i = inner; i < static_cast<NodeId>(forest.inner.size()); ++i) {
+    ids.push_back(i);
+    for (int lane = 0; lane < kWidth; ++lane) {
+      const NodeId child = forest.inner[i].child[lane];
+      if (child == kNoChild) continue;
+      forest.inner[i].child[lane] +=
+          child < 0 ? tree.edges_begin - edges : inner - tree.inner_begin;
+    }
+  }
+  for (auto i = edges; i < static_cast<NodeId>(forest.edges.size()); ++i) ids.push_back(~i);
+  for (const NodeId id : ids) forest.head(id).motion = motion;
+  link(ids, forest);
+  return ids[0];
+}
+
 // More trees of a kind get nodes above them. Not tuned.
 constexpr size_t kManyTrees = 32;
 // All but the largest: a node over a floor and what stands on it says little of either. Without
@@ -353,6 +392,21 @@ uint32_t append_motion(const EdgeMesh& mesh, const Lanes& lane_scale, Forest& fo
 
 }  // namespace
 
+// Of each object.
+struct KeptTrees {
+  std::vector<std::vector<KeptTree>> objects;
+};
+
+// The trees of an object that are kept, or to be kept; null: it is not shared.
+static std::vector<KeptTree>* kept_of(SharedObjects* shared, ShapeId object) {
+  if (!shared || object.index() >= shared->same.size() || !shared->same[object.index()]) {
+    return nullptr;
+  }
+  if (!shared->trees) shared->trees = std::make_shared<KeptTrees>();
+  shared->trees->objects.resize(shared->same.size());
+  return &shared->trees->objects[object.index()];
+}
+
 std::optional<ForestGroup> group_of(const EdgeMesh& mesh, const Edge& edge, bool cull_concave) {
   switch (edge.edge_class) {
     case EdgeClass::kSmooth:
@@ -386,23 +440,42 @@ NodeFrame frame_of(const Bounds& box) {
   return {center, truncated(1 / radius)};
 }
 
-Forest build_forest(const EdgeSamplerInput& input, int threads, const ForestConfig& config) {
+Forest build_forest(const EdgeSamplerInput& input, int threads, const ForestConfig& config,
+                    SharedObjects* shared) {
   Forest forest;
   forest.motions.emplace_back();
   std::vector<uint32_t> motions;
   for (const EdgeMesh& mesh : input.objects)
     motions.push_back(append_motion(mesh, input.lane_scale, forest));
   std::vector<Tree> trees;
-  for_every_tree(input, config.cull_concave, forest,
-                 [&](WedgeList& list, ShapeId object, ForestGroup group) {
-                   const EdgeMesh& mesh = input.object(object);
-                   const TreeKind kind{object, motions[object.index()], group, mesh.fold_contrast};
-                   const ObjectMotion motion = forest.motions[kind.motion];
-                   set_speeds(mesh, input.lane_scale, motion, list);
-                   const Wedge whole = stand_in(list, group, motion);
-                   const NodeId root = append_tree(list, {}, kind, threads, config, forest);
-                   trees.push_back(tree_of(root, whole, mesh.of_texture(), forest));
-                 });
+  const auto append = [&](WedgeList& list, ShapeId object, ForestGroup group) {
+    const EdgeMesh& mesh = input.object(object);
+    const TreeKind kind{object, motions[object.index()], group, mesh.fold_contrast};
+    const ObjectMotion motion = forest.motions[kind.motion];
+    set_speeds(mesh, input.lane_scale, motion, list);
+    const Wedge whole = stand_in(list, group, motion);
+    const auto inner = static_cast<NodeId>(forest.inner.size());
+    const auto edges = static_cast<NodeId>(forest.edges.size());
+    const NodeId root = append_tree(list, {}, kind, threads, config, forest);
+    trees.push_back(tree_of(root, whole, mesh.of_texture(), forest));
+    if (std::vector<KeptTree>* kept = kept_of(shared, object)) {
+      kept->push_back(kept_tree(forest, inner, edges, whole));
+    }
+  };
+  for (uint32_t o = 0; o < input.objects.size(); ++o) {
+    const EdgeMesh& mesh = input.objects[o];
+    forest.extent = std::max(forest.extent, mesh.extent);
+    forest.slots.emplace_back(mesh.edges.size(), kNoParent);
+    const std::vector<KeptTree>* const kept = kept_of(shared, ShapeId(o));
+    if (!kept || kept->empty()) {
+      for_trees_of(mesh, ShapeId(o), config.cull_concave, append);
+      continue;
+    }
+    for (const KeptTree& tree : *kept) {
+      const NodeId root = append_kept(tree, motions[o], forest);
+      trees.push_back(tree_of(root, tree.stand_in, mesh.of_texture(), forest));
+    }
+  }
   append_roots(trees, threads, config, forest);
   const auto moves = [&](NodeId root) {
     return bits((root < 0 ? forest.edges[~root].speed : forest.inner[root].speed) > 0) != 0;

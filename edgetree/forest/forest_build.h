@@ -14,7 +14,7 @@
 #include "edgetree/forest/wedge_list.h"
 #include "edgetree/simd.h"
 #include "limn/core/bounds.h"
-#include "limn/edgetree/edge_sampler.h"
+#include "limn/edgetree/edge_sampler_types.h"
 #include "limn/edgetree/rejection_tree.h"
 
 namespace limn {
@@ -22,8 +22,25 @@ namespace limn {
 // The group of an edge; nothing if no query needs the edge.
 std::optional<ForestGroup> group_of(const EdgeMesh& mesh, const Edge& edge, bool cull_concave);
 Bounds bounds_of(std::span<const Wedge> wedges);
-// Calls append(list, object, group) for every object and group with edges, in a fixed order,
-// after giving `trees` (Forest, QuadricForest) a slot for every edge.
+// Calls append(list, object, group) for every group of an object that has edges, in a fixed order.
+template <class Append>
+void for_trees_of(const EdgeMesh& mesh, ShapeId object, bool cull_concave, const Append& append) {
+  size_t counts[kForestGroups] = {};
+  for (const Edge& edge : mesh.edges) {
+    if (const auto group = group_of(mesh, edge, cull_concave)) ++counts[static_cast<int>(*group)];
+  }
+  std::vector<WedgeList> groups(kForestGroups, WedgeList(mesh));
+  for (int g = 0; g < kForestGroups; ++g) groups[g].reserve(counts[g]);
+  for (uint32_t e = 0; e < mesh.edges.size(); ++e) {
+    if (const auto group = group_of(mesh, mesh.edges[e], cull_concave)) {
+      groups[static_cast<int>(*group)].add(EdgeId(e));
+    }
+  }
+  for (int g = 0; g < kForestGroups; ++g) {
+    if (groups[g].size() > 0) append(groups[g], object, static_cast<ForestGroup>(g));
+  }
+}
+// The same of every object, after giving `trees` (Forest, QuadricForest) a slot for every edge.
 template <class Trees, class Append>
 void for_every_tree(const EdgeSamplerInput& input, bool cull_concave, Trees& trees,
                     const Append& append) {
@@ -31,27 +48,16 @@ void for_every_tree(const EdgeSamplerInput& input, bool cull_concave, Trees& tre
     const EdgeMesh& mesh = input.objects[o];
     trees.extent = std::max(trees.extent, mesh.extent);
     trees.slots.emplace_back(mesh.edges.size(), kNoParent);
-    size_t counts[kForestGroups] = {};
-    for (const Edge& edge : mesh.edges) {
-      if (const auto group = group_of(mesh, edge, cull_concave)) ++counts[static_cast<int>(*group)];
-    }
-    std::vector<WedgeList> groups(kForestGroups, WedgeList(mesh));
-    for (int g = 0; g < kForestGroups; ++g) groups[g].reserve(counts[g]);
-    for (uint32_t e = 0; e < mesh.edges.size(); ++e) {
-      if (const auto group = group_of(mesh, mesh.edges[e], cull_concave)) {
-        groups[static_cast<int>(*group)].add(EdgeId(e));
-      }
-    }
-    for (int g = 0; g < kForestGroups; ++g) {
-      if (groups[g].size() > 0) append(groups[g], ShapeId(o), static_cast<ForestGroup>(g));
-    }
+    for_trees_of(mesh, ShapeId(o), cull_concave, append);
   }
 }
 // The frame of a node: its cube [-1, 1]^3 contains the box of its edges.
 NodeFrame frame_of(const Bounds& box);
 
-// Builds one tree per object and group with edges. The result does not depend on `threads`.
-Forest build_forest(const EdgeSamplerInput& input, int threads, const ForestConfig& config);
+// Builds one tree per object and group with edges. The result does not depend on `threads`, nor on
+// what is shared.
+Forest build_forest(const EdgeSamplerInput& input, int threads, const ForestConfig& config,
+                    SharedObjects* shared = nullptr);
 
 // The children of a node are all nodes, or, if it has at most `width` edges, one edge
 // each.

@@ -9,6 +9,7 @@
 #include "integrators/backward/parameter_slots.h"
 #include "integrators/backward/reverse_estimator.h"
 #include "integrators/backward/reverse_pilot.h"
+#include "integrators/edges/scene_edges.h"
 #include "integrators/estimates/batches.h"
 #include "integrators/methods/hair_gaps.h"
 #include "limn/core/exposure.h"
@@ -72,11 +73,12 @@ BackwardResult run(const Scene& scene, std::unique_ptr<Estimator> owned, const I
   std::vector<std::unique_ptr<SampleEstimator>> estimators;
   estimators.push_back(std::move(owned));
   EstimatorsAt at;
+  KeptEdges kept;
   if (!kExact && needs_times(scene, estimator.parameters().parameters())) {
     at = [&](double u) {
       EstimatorsAtTime now;
       now.list.push_back(
-          std::make_unique<ReverseEstimator>(scene, adjoint, options, settings.threads, u));
+          std::make_unique<ReverseEstimator>(scene, adjoint, options, settings.threads, u, &kept));
       return now;
     };
   }

@@ -25,7 +25,7 @@ namespace limn {
 
 ReverseEstimator::ReverseEstimator(const Scene& scene, const Image& adjoint,
                                    const BackwardOptions& options, int threads,
-                                   const std::optional<double>& time)
+                                   const std::optional<double>& time, KeptEdges* kept)
     : options_(options),
       film_(scene.film, adjoint_pixels(scene, adjoint)),
       choice_(film_.pixels(), options.uniform_pixels),
@@ -37,7 +37,7 @@ ReverseEstimator::ReverseEstimator(const Scene& scene, const Image& adjoint,
                  ? FilmField::make(traced_.context(), options.least_detail, parameters_, threads)
                  : nullptr),
       free_(parameters_.free()),
-      input_(traced_.context(), 3, {1, 1, 1, 1}, method_.sampler, threads),
+      input_(traced_.context(), 3, {1, 1, 1, 1}, method_.sampler, threads, false, kept),
       filter_(scene.film.filter),
       motion_(parameters_.slots(), moved_.any() ? &input_.edges() : nullptr),
       types_(terms_of(parameters_.scene(), method_.sampler, method_.closed, field_ != nullptr)) {

@@ -20,9 +20,9 @@ namespace limn {
 class ReverseEstimator final : public GradientEstimator {
  public:
   // InputError as backward().
-  // time: as of ParameterSlots.
+  // time: as of ParameterSlots. kept: of other times; may be null.
   ReverseEstimator(const Scene& scene, const Image& adjoint, const BackwardOptions& options,
-                   int threads, const std::optional<double>& time = {});
+                   int threads, const std::optional<double>& time = {}, KeptEdges* kept = nullptr);
   ReverseEstimator(const ReverseEstimator&) = delete;
   ReverseEstimator& operator=(const ReverseEstimator&) = delete;
 

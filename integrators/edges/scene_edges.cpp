@@ -12,6 +12,7 @@
 
 #include "integrators/edges/texture_discontinuities.h"
 #include "limn/core/duplicate_faces.h"
+#include "limn/core/exposure.h"
 #include "limn/core/lights.h"
 #include "limn/core/surface_point.h"
 #include "limn/edgetree/crossing_curves.h"
@@ -22,14 +23,15 @@ namespace limn {
 namespace {
 
 // Shapes look alike if they share a BSDF; every emitter looks like itself alone.
-std::vector<TouchingShape> touching_shapes(const Scene& scene) {
+std::vector<TouchingShape> touching_shapes(const Scene& scene,
+                                           std::span<const Mesh* const> meshes) {
   std::vector<TouchingShape> shapes;
   std::map<const Bsdf*, uint32_t> first_of_bsdf;
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
     const Shape& shape = scene.shapes[s];
     const uint32_t look =
         shape.is_emitter ? s : first_of_bsdf.emplace(shape.bsdf.get(), s).first->second;
-    shapes.push_back({&shape.mesh, look, shape.mesh.textured});
+    shapes.push_back({meshes[s], look, shape.mesh.textured});
   }
   return shapes;
 }
@@ -97,10 +99,11 @@ void drop_folds(EdgeMesh& mesh) {
 
 using ShapePair = std::array<ShapeId, 2>;
 
+bool is_of_lines(const EdgeMesh& mesh) { return !mesh.shape.valid(); }
+
 // Those of lines of contact, not of crossings.
 std::set<ShapePair> pressed_pairs(const EdgeSamplerInput& edges) {
   std::set<ShapePair> pairs;
-  const auto is_of_lines = [](const EdgeMesh& mesh) { return !mesh.shape.valid(); };
   const auto found = std::find_if(edges.objects.begin(), edges.objects.end(), is_of_lines);
   if (found == edges.objects.end()) return pairs;
   const EdgeMesh& lines = *found;
@@ -119,37 +122,47 @@ std::string pair_in_text(const Scene& scene, const ShapePair& pair) {
   return fmt::format("{} and {}", first, quoted_name(scene, pair[1]));
 }
 
-}  // namespace
-
-EdgeSamplerInput make_scene_edges(const Scene& scene, int threads) {
+// As make_scene_edges(), of the chosen shapes alone: the objects of others are empty.
+EdgeSamplerInput edges_of(const Scene& scene, const std::vector<bool>& chosen, int threads) {
+  static const Mesh none;
   EdgeSamplerInput input;
   std::vector<const Mesh*> meshes;
   const TextureDiscontinuities textures(scene);
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
     const Shape& shape = scene.shapes[s];
+    meshes.push_back(chosen[s] ? &shape.mesh : &none);
+    if (!chosen[s]) {
+      input.objects.emplace_back().shape = ShapeId(s);
+      continue;
+    }
     input.objects.push_back(build_edge_mesh(shape.mesh, is_black_behind(shape), ShapeId(s),
                                             textures.seams(ShapeId(s))));
     input.objects.back().fold_contrast = fold_contrast(shape);
     if (ignores_normals(scene, shape)) drop_folds(input.objects.back());
-    meshes.push_back(&shape.mesh);
   }
   const Vec3d pinhole = value(scene.camera.origin);
   const std::vector<FacePair> pairs = find_face_pairs(meshes, pinhole, threads);
   const auto [contacts, parting] =
-      unite_touching_edges(touching_shapes(scene), pairs, pinhole, threads, input.objects);
+      unite_touching_edges(touching_shapes(scene, meshes), pairs, pinhole, threads, input.objects);
   std::vector<IntersectionSegment> crossings = find_intersections(meshes, pairs, threads);
   leave_out_duplicates(scene, crossings);
   if (!crossings.empty() || !contacts.empty())
     input.objects.push_back(intersection_edges(meshes, crossings, contacts));
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
     const auto segments = textures.segments(ShapeId(s));
-    if (segments.empty()) continue;
+    if (segments.empty() || !chosen[s]) continue;
     input.objects.push_back(
         texture_edges(*meshes[s], input.objects[s], is_black_behind(scene.shapes[s]), segments));
   }
   input.parting = parting;
   if (scene.environment) input.environment_luminance = scene.environment->mean_luminance();
   return input;
+}
+
+}  // namespace
+
+EdgeSamplerInput make_scene_edges(const Scene& scene, int threads) {
+  return edges_of(scene, std::vector<bool>(scene.shapes.size(), true), threads);
 }
 
 EdgeSamplerInput make_sampler_input(const Scene& scene, int threads) {
@@ -166,6 +179,71 @@ void add_light(const Scene& scene, EdgeSamplerInput& input) {
     return std::max(0.0, luminance(scene.environment->radiance(d)));
   };
   input.environment = std::make_shared<RadiancePyramid>(brightness, 8, 2);
+}
+
+static bool are_equal(const Tangents& a, const Tangents& b) {
+  if (a.size() != b.size() || a.all_alike() != b.all_alike()) return false;
+  const size_t count = a.all_alike() ? std::min<size_t>(1, a.size()) : a.size();
+  for (size_t i = 0; i < count; ++i) {
+    const Vec3<Lanes> d = a[i] - b[i];
+    if (!is_zero(d.x) || !is_zero(d.y) || !is_zero(d.z)) return false;
+  }
+  return true;
+}
+
+bool KeptEdges::is_known(const Scene& scene) {
+  bool known = !still_.objects.empty() && pinhole_ == value(scene.camera.origin);
+  for (size_t s = 0; s < scene.shapes.size(); ++s) {
+    if (moving_.size() == s) moving_.push_back(scene.exposure->shapes[s].moves());
+    const Mesh& mesh = scene.shapes[s].mesh;
+    if (!known || moving_[s]) continue;
+    const Kept& kept = kept_[s];
+    // Where it stands still, but its derivatives do not.
+    moving_[s] = kept.positions != mesh.positions || kept.normals != mesh.normals ||
+                 !are_equal(kept.tangents, mesh.position_tangents);
+    known = !moving_[s];
+  }
+  return known;
+}
+
+// Objects are in the order of make_scene_edges().
+EdgeSamplerInput KeptEdges::joined(EdgeSamplerInput moving) const {
+  EdgeSamplerInput all = still_;
+  const size_t shapes = moving_.size();
+  for (size_t s = 0; s < shapes; ++s) {
+    if (moving_[s]) all.objects[s] = std::move(moving.objects[s]);
+  }
+  all.objects.insert(all.objects.end(), std::move_iterator(moving.objects.begin() + shapes),
+                     std::move_iterator(moving.objects.end()));
+  const auto of_textures = std::find_if(all.objects.begin() + shapes, all.objects.end(),
+                                        [](const EdgeMesh& mesh) { return mesh.of_texture(); });
+  std::stable_sort(of_textures, all.objects.end(),
+                   [](const EdgeMesh& a, const EdgeMesh& b) { return a.shape < b.shape; });
+  all.parting.insert(all.parting.end(), moving.parting.begin(), moving.parting.end());
+  std::ranges::sort(all.parting);
+  return all;
+}
+
+EdgeSamplerInput KeptEdges::make(const Scene& scene, int threads) {
+  const bool known = is_known(scene);
+  shared_ = nullptr;
+  if (!is_apart(scene, moving_)) return make_scene_edges(scene, threads);
+  if (!known) {
+    std::vector<bool> still = moving_;
+    still.flip();
+    still_ = edges_of(scene, still, threads);
+    still_shared_ = std::make_shared<SharedObjects>(SharedObjects{std::move(still)});
+    pinhole_ = value(scene.camera.origin);
+    kept_.clear();
+    for (const Shape& shape : scene.shapes) {
+      const Mesh& mesh = shape.mesh;
+      kept_.push_back({mesh.positions, mesh.normals, mesh.position_tangents});
+    }
+  }
+  EdgeSamplerInput moving = edges_of(scene, moving_, threads);
+  if (std::ranges::any_of(moving.objects, is_of_lines)) return make_scene_edges(scene, threads);
+  shared_ = still_shared_;
+  return joined(std::move(moving));
 }
 
 void warn_of_contacts(const Scene& scene, const EdgeSamplerInput* edges,

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "limn/core/scene.h"
-#include "limn/edgetree/edge_sampler.h"
+#include "limn/edgetree/edge_sampler_types.h"
 
 namespace limn {
 
@@ -15,6 +15,33 @@ EdgeSamplerInput make_sampler_input(const Scene& scene, int threads);
 // The same in two steps: all but light polygons and the environment over directions; and these.
 EdgeSamplerInput make_scene_edges(const Scene& scene, int threads);
 void add_light(const Scene& scene, EdgeSamplerInput& input);
+
+// The edges of a scene at several times of the shutter: those of shapes that stand still are found
+// once.
+class KeptEdges {
+ public:
+  // As make_scene_edges(), of the scene at a time.
+  EdgeSamplerInput make(const Scene& scene, int threads);
+  // Of the input that was made last; null: nothing is.
+  SharedObjects* shared() { return shared_ ? &*shared_ : nullptr; }
+
+ private:
+  // Of a shape, as it was when still_ was made.
+  struct Kept {
+    SharedVector<Vec3f> positions;
+    SharedVector<Vec3d> normals;
+    Tangents tangents;
+  };
+  // Sets moving_. False if still_ is not that of the scene.
+  bool is_known(const Scene& scene);
+  EdgeSamplerInput joined(EdgeSamplerInput moving) const;
+
+  std::vector<bool> moving_;  // of each shape
+  std::vector<Kept> kept_;    // of each shape
+  Vec3d pinhole_;
+  EdgeSamplerInput still_;  // without objects: unknown
+  std::shared_ptr<SharedObjects> still_shared_, shared_;
+};
 
 // One for each pair of shapes that touch and move towards each other or apart (ContactLine); none
 // twice. edges: of the scene, in motion; null: none.

@@ -80,7 +80,9 @@ void check_closed_light(const Scene& scene) {
 }
 
 ClosedLight::SharedGeometry::SharedGeometry(const Scene& scene, int threads)
-    : number(next_number()), copies(scene), overlaps(scene, copies, threads), tree(scene) {}
+    : number(next_number()), copies(scene), overlaps(scene, copies, threads), tree(scene) {
+  tree.find_neighbours();
+}
 
 ClosedLight::ClosedLight(const Scene& scene, int threads, By by)
     : scene_((check_closed_light(scene), scene)),

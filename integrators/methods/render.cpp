@@ -102,18 +102,22 @@ EstimatorList estimators_of(const Scene& scene, const RunSettings& settings,
   return estimators;
 }
 
+// The scene, if it moves, with what its times share.
+std::optional<Scene> shared_by_times(const Scene& scene, int threads) {
+  std::optional<Scene> start;
+  if (is_moving(scene)) share_between_times(start.emplace(scene), threads);
+  return start;
+}
+
 // watch: runs since the job began.
 RenderResult run(const Scene& scene, const EstimatorList& estimators, const RunSettings& settings,
                  const Stopwatch& watch, const RenderOptions& options) {
   const FilmPoints points = options.points;
   const size_t size = film_size(scene.film);
   EstimatorsAt at;
-  Scene start;
   if (is_moving(scene)) {
-    start = scene;
-    find_overlaps(start, settings.threads);
     at = [&](double u) {
-      const auto there = std::make_shared<const Scene>(at_time(start, u));
+      const auto there = std::make_shared<const Scene>(at_time(scene, u));
       EstimatorsAtTime now{{there}};
       now.list.push_back(make_estimator(*there, settings, options));
       return now;
@@ -156,9 +160,11 @@ RenderResult render(const Scene& scene, const RunSettings& requested,
   check_task(options.method, Task::kImage);
   check_blur(options.blur, {options.method});
   if (settings.store) identify(*settings.store, options);
-  const EstimatorList estimators = estimators_of(scene, settings, options);
+  const std::optional<Scene> shared = shared_by_times(scene, settings.threads);
+  const Scene& start = shared ? *shared : scene;
+  const EstimatorList estimators = estimators_of(start, settings, options);
   const auto* around = dynamic_cast<const VisibilityEstimator*>(estimators[0].get());
-  RenderResult result = run(scene, estimators, settings, watch, options);
+  RenderResult result = run(start, estimators, settings, watch, options);
   if (options.method->blurs) {
     result.warnings.push_back(
         bias_of_blur(scene, resolved(options.method->blurred_by(options.blur), scene)));
@@ -179,7 +185,9 @@ std::vector<RenderResult> render_seeds(const Scene& scene, const RunSettings& se
   const Stopwatch watch;
   RunSettings own = settings_for(options.points, settings);
   own.store = nullptr;
-  const EstimatorList estimators = estimators_of(scene, own, options);
+  const std::optional<Scene> shared = shared_by_times(scene, own.threads);
+  const Scene& start = shared ? *shared : scene;
+  const EstimatorList estimators = estimators_of(start, own, options);
   if (own.seconds > 0) {
     const double setup = watch.seconds() / static_cast<double>(seeds.size());
     own.seconds = std::max(1e-9, settings.seconds - setup);
@@ -187,7 +195,7 @@ std::vector<RenderResult> render_seeds(const Scene& scene, const RunSettings& se
   std::vector<RenderResult> results;
   for (const uint64_t seed : seeds) {
     own.seed = seed;
-    results.push_back(run(scene, estimators, own, Stopwatch(), options));
+    results.push_back(run(start, estimators, own, Stopwatch(), options));
   }
   return results;
 }

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "integrators/edges/scene_edges.h"
 #include "integrators/edges/texture_discontinuities.h"
 #include "integrators/estimates/batches.h"
 #include "integrators/methods/run_notes.h"
@@ -84,7 +85,11 @@ class TermJob {
     if (options.samples) check_samples(*options.samples);
     moved_ = moved_in(scene, parameters_);
     keep_changed(chosen);
-    if (moving_) method_.moves_directions = method_.random_directions = false;
+    if (moving_) {
+      method_.moves_directions = method_.random_directions = false;
+      start_ = scene;
+      share_between_times(*start_, settings.threads);
+    }
     passes_ = passes_at(moving_ ? std::optional(kPilotTime) : std::nullopt, settings.threads);
   }
 
@@ -140,18 +145,20 @@ class TermJob {
  private:
   // time: of the shutter; none: the reference time.
   std::vector<std::unique_ptr<SampleEstimator>> passes_at(const std::optional<double>& time,
-                                                          int threads) const {
+                                                          int threads) {
     const Warping warping{options_.warp, method_.unbiased};
-    const TermExtras extras{.warping = method_.warps ? &warping : nullptr,
-                            .closed = method_.closed,
-                            .moved_film = moves_film_,
-                            .time = time};
+    TermExtras extras{.warping = method_.warps ? &warping : nullptr,
+                      .closed = method_.closed,
+                      .moved_film = moves_film_,
+                      .time = time};
     std::vector<std::unique_ptr<SampleEstimator>> passes;
+    if (time) kept_.resize((parameters_.size() + kLanes - 1) / kLanes);
     for (size_t k = 0; k < parameters_.size(); k += kLanes) {
+      if (time) extras.kept = &kept_[k / kLanes];
       const auto some =
           std::span(parameters_).subspan(k).first(std::min<size_t>(kLanes, parameters_.size() - k));
-      passes.push_back(std::make_unique<TermEstimator>(scene_, some, types_, computed_,
-                                                       method_.sampler, threads, extras));
+      passes.push_back(std::make_unique<TermEstimator>(
+          start_ ? *start_ : scene_, some, types_, computed_, method_.sampler, threads, extras));
     }
     return passes;
   }
@@ -544,6 +551,8 @@ class TermJob {
   std::vector<const TermType*> types_;   // that can differ from zero
   std::vector<bool> computed_;           // of each term
   std::optional<SampleCounts> samples_;  // the options', of each term
+  std::optional<Scene> start_;           // of scenes that move: the scene, with known overlaps
+  std::vector<KeptEdges> kept_;          // the same, of each pass
   std::vector<std::unique_ptr<SampleEstimator>> passes_;
 };
 

@@ -32,6 +32,7 @@ struct TermExtras {
   bool moved_film = false;
   bool of_differences = false;      // paths are those of differences
   std::optional<double> time = {};  // of the shutter, see at_time(); none: the reference time
+  KeptEdges* kept = nullptr;        // of other times; must outlive the estimator; may be null
 };
 
 class TermEstimator final : public SampleEstimator {

@@ -53,7 +53,8 @@ std::vector<bool> changed_terms(std::span<const TermType* const> types,
 const EdgeSamplerInput& TermInput::edges() {
   if (edges_) return *edges_;
   const Stopwatch watch;
-  edges_ = std::make_unique<EdgeSamplerInput>(make_scene_edges(context.scene, threads));
+  edges_ = std::make_unique<EdgeSamplerInput>(kept ? kept->make(context.scene, threads)
+                                                   : make_scene_edges(context.scene, threads));
   edges_->lane_scale = lane_scale;
   if (sampler.regions) {
     regions_ = std::make_unique<LightRegions>(context.scene);
@@ -96,7 +97,7 @@ const EdgeSampler& TermInput::edge_sampler() {
   } else {
     add_light(context.scene, input);
   }
-  edge_sampler_ = sampler.make(input, threads);
+  edge_sampler_ = sampler.make(input, threads, kept ? kept->shared() : nullptr);
   edge_sampler_seconds_ = watch.seconds();
   return *edge_sampler_;
 }

@@ -105,6 +105,7 @@ class Term {
 };
 
 struct FreeMotion;
+class KeptEdges;
 struct Moved;
 struct Parameter;
 
@@ -112,20 +113,23 @@ struct Parameter;
 class TermInput {
  public:
   TermInput(const PathContext& path_context, int lane_count, const Lanes& lane_scales,
-            const EdgeSamplerType& sampler_type, int thread_count, bool warped = false)
+            const EdgeSamplerType& sampler_type, int thread_count, bool warped = false,
+            KeptEdges* kept_edges = nullptr)
       : context(path_context),
         lanes(lane_count),
         lane_scale(lane_scales),
         sampler(sampler_type),
         threads(thread_count),
-        warps(warped) {}
+        warps(warped),
+        kept(kept_edges) {}
 
   const PathContext& context;  // the scene with its parameters seeded
   int lanes;                   // how many derivative lanes are in use
   Lanes lane_scale;            // what makes speeds of the parameters comparable
   EdgeSamplerType sampler;     // how shading points choose an edge
   int threads;
-  bool warps;  // whether directions are warped, see warp_field.h
+  bool warps;       // whether directions are warped, see warp_field.h
+  KeptEdges* kept;  // of the scene at other times; null where there are none
   // In reverse mode: what may move, each vertex by itself. Else null.
   const FreeMotion* free = nullptr;
 

@@ -29,18 +29,6 @@ bool is_closed(const Mesh& mesh) {
   });
 }
 
-// Whether the point x of the face's plane lies in the face, farther than `far` from all its sides.
-// n: the face's normal, of any length.
-bool is_deep(const std::array<Vec3d, 3>& corners, const Vec3d& n, const Vec3d& x, double far) {
-  const double squared = far * far * dot(n, n);
-  for (int k = 0; k < 3; ++k) {
-    const Vec3d u = corners[(k + 1) % 3] - corners[k];
-    const double side = dot(cross(n, u), x - corners[k]);  // its distance times |n| |u|
-    if (!(side > 0) || !(side * side > squared * dot(u, u))) return false;
-  }
-  return true;
-}
-
 bool before(const BlurHit& a, const BlurHit& b) {
   if (a.t != b.t) return a.t < b.t;
   if (a.face.shape != b.face.shape) return a.face.shape < b.face.shape;
@@ -60,13 +48,18 @@ BlurFaces::BlurFaces(const Scene& scene, const Blur& blur)
     MeshFaces& own = meshes_[s];
     own.front_only = !shape.bsdf->side(false) && is_closed(mesh);
     own.first.assign(mesh.positions.size() + 1, 0);
-    for (const FaceIndices& f : mesh.faces) {
-      for (const uint32_t v : f) ++own.first[mesh.weld[v] + 1];
+    std::vector<uint32_t> faces;
+    for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
+      const auto c = face_corners<double>(mesh, FaceId(f));
+      own.normals.push_back(cross(c[1] - c[0], c[2] - c[0]));
+      if (!has_area(mesh, mesh.faces[f])) continue;
+      faces.push_back(f);
+      for (const uint32_t v : mesh.faces[f]) ++own.first[mesh.weld[v] + 1];
     }
     for (size_t v = 0; v < mesh.positions.size(); ++v) own.first[v + 1] += own.first[v];
-    own.around.resize(3 * mesh.faces.size());
+    own.around.resize(3 * faces.size());
     std::vector<uint32_t> next = own.first;
-    for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
+    for (const uint32_t f : faces) {
       for (const uint32_t v : mesh.faces[f]) own.around[next[mesh.weld[v]]++] = f;
     }
   }
@@ -81,6 +74,24 @@ bool BlurFaces::touch(FaceRef a, FaceRef b) const {
     }
   }
   return false;
+}
+
+// Few points need the distance to the sides.
+double BlurFaces::opacity_at(const std::array<Vec3d, 3>& corners, const Vec3d& n,
+                             const Vec3d& x) const {
+  constexpr double kBeyond = 1.01;  // far above rounding
+  const double squared = reach_ * reach_ * dot(n, n);
+  bool deep = true;
+  for (int k = 0; k < 3; ++k) {
+    const Vec3d u = corners[(k + 1) % 3] - corners[k];
+    const double side = dot(cross(n, u), x - corners[k]);  // its distance times |n| |u|
+    const double own = side * side, most = squared * dot(u, u);
+    if (side < 0 && own > kBeyond * most) return 0;
+    deep = deep && side > 0 && own > most;
+  }
+  if (deep) return 1;
+  const double distance = distance_to_sides(corners, x);
+  return distance > -reach_ ? blur_opacity(distance, blur_.sigma) : 0;
 }
 
 bool BlurFaces::is_beside_start(const Ray& ray, FaceRef face,
@@ -103,21 +114,16 @@ bool BlurFaces::is_beside_start(const Ray& ray, FaceRef face,
 std::optional<BlurHit> BlurFaces::meet(const Ray& ray, FaceRef face) const {
   const Shape& shape = scene_.shape(face.shape);
   if (ray.skip_emitters && shape.is_emitter) return {};
-  const auto corners = face_corners<double>(shape.mesh, face.face);
-  const Vec3d n = cross(corners[1] - corners[0], corners[2] - corners[0]);
+  const MeshFaces& own = meshes_[face.shape.index()];
+  const Vec3d& n = own.normals[face.face.index()];
   const double facing = dot(n, ray.direction);
-  if (facing == 0 || (facing > 0 && meshes_[face.shape.index()].front_only)) return {};
-  const double t = dot(n, corners[0] - ray.origin) / facing;
+  if (facing == 0 || (facing > 0 && own.front_only)) return {};
+  const Vec3f& corner = shape.mesh.positions[shape.mesh.face(face.face)[0]];
+  const double t = dot(n, cast<double>(corner) - ray.origin) / facing;
   if (!(t > ray.t_min) || !(t < ray.t_max)) return {};
-  const Vec3d x = ray.origin + ray.direction * t;
-  double opacity = 1;
-  if (!is_deep(corners, n, x, reach_)) {
-    const double distance = distance_to_sides(corners, x);
-    if (!(distance > -reach_)) return {};
-    opacity = blur_opacity(distance, blur_.sigma);
-  }
-  if (is_beside_start(ray, face, corners)) return {};
-  if (!(opacity > 0)) return {};
+  const auto corners = face_corners<double>(shape.mesh, face.face);
+  const double opacity = opacity_at(corners, n, ray.origin + ray.direction * t);
+  if (!(opacity > 0) || is_beside_start(ray, face, corners)) return {};
   return BlurHit{face, t, opacity, facing < 0};
 }
 
@@ -141,7 +147,7 @@ void BlurFaces::settle(const Ray& ray, std::vector<BlurHit>& hits) const {
   for (const uint32_t v : mesh.face(face.face)) {
     for (uint32_t i = own.first[mesh.weld[v]]; i < own.first[mesh.weld[v] + 1]; ++i) {
       const FaceRef other{face.shape, FaceId(own.around[i])};
-      if (other == face || !has_area(mesh, mesh.face(other.face))) continue;
+      if (other == face) continue;
       if (const auto hit = meet(behind, other)) hits.push_back(*hit);
     }
   }

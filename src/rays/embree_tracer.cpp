@@ -151,17 +151,18 @@ bool is_rounding(const Context& context, FaceRef face, double t) {
                    face);
 }
 
-// The face that Embree names. Shapes in coordinates of their own are instances.
-FaceRef face_of(uint32_t instance, uint32_t geometry, uint32_t primitive) {
-  return {ShapeId(instance != RTC_INVALID_GEOMETRY_ID ? instance : geometry), FaceId(primitive)};
+// The face that Embree names. Shapes in coordinates of their own are instances, and so are all
+// together that stand still: that has a number behind the shapes'.
+FaceRef face_of(const Scene& scene, uint32_t instance, uint32_t geometry, uint32_t primitive) {
+  return {ShapeId(instance < scene.shapes.size() ? instance : geometry), FaceId(primitive)};
 }
 
 void reject_skipped(const RTCFilterFunctionNArguments* arguments) {
   const auto& context = *reinterpret_cast<const Context*>(arguments->context);
   // Rays are traced one at a time.
   const FaceRef face =
-      face_of(RTCHitN_instID(arguments->hit, 1, 0, 0), RTCHitN_geomID(arguments->hit, 1, 0),
-              RTCHitN_primID(arguments->hit, 1, 0));
+      face_of(*context.scene, RTCHitN_instID(arguments->hit, 1, 0, 0),
+              RTCHitN_geomID(arguments->hit, 1, 0), RTCHitN_primID(arguments->hit, 1, 0));
   if (is_skipped(context, face) || is_rounding(context, face, RTCRayN_tfar(arguments->ray, 1, 0)))
     arguments->valid[0] = 0;
 }
@@ -178,8 +179,8 @@ void reject_skipped_of_packet(const RTCFilterFunctionNArguments* arguments) {
     if (arguments->valid[i] == 0) continue;
     const Context& context = packet.rays[RTCRayN_id(arguments->ray, n, i)];
     const FaceRef face =
-        face_of(RTCHitN_instID(arguments->hit, n, i, 0), RTCHitN_geomID(arguments->hit, n, i),
-                RTCHitN_primID(arguments->hit, n, i));
+        face_of(*context.scene, RTCHitN_instID(arguments->hit, n, i, 0),
+                RTCHitN_geomID(arguments->hit, n, i), RTCHitN_primID(arguments->hit, n, i));
     if (is_skipped(context, face) || is_rounding(context, face, RTCRayN_tfar(arguments->ray, n, i)))
       arguments->valid[i] = 0;
   }
@@ -217,8 +218,7 @@ constexpr double kReach = 0x1p-12;
 // The origin of Embree's coordinates: nonzero on axes where the scene is far from 0 compared with
 // its size. Subtraction is exact for floats between half and twice this value (Sterbenz 1974). Ray
 // origins thus keep their precision.
-Vec3d origin_of(const Scene& scene) {
-  const Bounds bounds = bounds_of(scene);
+Vec3d origin_of(const Scene& scene, const Bounds& bounds) {
   Vec3d origin;
   if (scene.shapes.empty()) return origin;
   const Vec3d center = bounds.center();
@@ -265,6 +265,50 @@ class EmbreeErrors {
   std::string first_;
 };
 
+class EmbreeDevice {
+ public:
+  EmbreeDevice() {
+    // Without a number of threads: Embree would limit all of TBB to the machine's cores by it.
+    device_.reset(rtcNewDevice(nullptr));
+    if (!device_) throw InputError("Embree cannot start on this machine");
+    rtcSetDeviceErrorFunction(device_.get(), EmbreeErrors::note, &errors_);
+  }
+  RTCDevice get() const { return device_.get(); }
+  void check() { errors_.check(); }
+
+ private:
+  EmbreeErrors errors_;  // must be declared before the device that reports to it
+  Owned<RTCDevice> device_;
+};
+
+}  // namespace
+
+// Shapes that stand still, ready to be traced.
+struct KeptShapes {
+  EmbreeDevice device;
+  std::mutex mutex;  // of all below
+  Vec3d origin;
+  std::vector<bool> still;                                          // of each shape: it is here
+  std::vector<SharedVector<Vec3f>> positions;                       // of each shape
+  std::vector<std::pair<uint32_t, Owned<RTCGeometry>>> geometries;  // by their numbers
+
+  // Whether its shapes are those of the scene; what has moved is no longer one.
+  bool holds(const Scene& scene, const Vec3d& scene_origin) {
+    bool same = !positions.empty() && origin == scene_origin;
+    for (size_t s = 0; s < scene.shapes.size(); ++s) {
+      if (still.size() == s) still.push_back(!scene.exposure->shapes[s].moves());
+      if (!same || !still[s]) continue;
+      still[s] = positions[s] == scene.shapes[s].mesh.positions;
+      same = still[s];
+    }
+    return same;
+  }
+};
+
+std::shared_ptr<KeptShapes> make_kept_shapes() { return std::make_shared<KeptShapes>(); }
+
+namespace {
+
 class EmbreeTracer final : public RayTracer {
  public:
   EmbreeTracer(const Scene& scene, int threads, std::shared_ptr<const CoincidentFaces> faces)
@@ -275,15 +319,17 @@ class EmbreeTracer final : public RayTracer {
         copies_(faces_->copies),
         overlaps_(faces_->overlaps),
         settles_(!copies_.empty() || !overlaps_.empty()),
-        origin_(origin_of(scene)),
-        reach_(kReach * bounds_of(scene).diagonal()) {
-    // Without a number of threads: Embree would limit all of TBB to the machine's cores by it.
-    device_.reset(rtcNewDevice(nullptr));
-    if (!device_) throw InputError("Embree cannot start on this machine");
-    rtcSetDeviceErrorFunction(device_.get(), EmbreeErrors::note, &errors_);
-    rtc_scene_ = make_scene();
-    for (size_t i = 0; i < scene.shapes.size(); ++i)
-      attach(scene.shapes[i].mesh, ShapeId(static_cast<uint32_t>(i)), threads);
+        bounds_(bounds_of(scene)),
+        origin_(origin_of(scene, bounds_)),
+        reach_(kReach * bounds_.diagonal()),
+        device_(device_of(scene)),
+        rtc_scene_(make_scene(quality())) {
+    const std::vector<bool> held = attach_kept(threads);
+    for (uint32_t i = 0; i < scene.shapes.size(); ++i) {
+      if (held[i]) continue;
+      const Owned<RTCGeometry> geometry = make_shape(ShapeId(i), threads);
+      attach(rtc_scene_.get(), geometry.get(), i);
+    }
     commit(rtc_scene_.get(), threads);
   }
 
@@ -296,7 +342,7 @@ class EmbreeTracer final : public RayTracer {
     intersect(rtc_scene_.get(), context.base, query);
     const bool found = query.hit.geomID != RTC_INVALID_GEOMETRY_ID;
     if (found) {
-      hit.face = face_of(query.hit.instID[0], query.hit.geomID, query.hit.primID);
+      hit.face = face_of(scene_, query.hit.instID[0], query.hit.geomID, query.hit.primID);
       hit.t = query.ray.tfar;
       settle(ray, hit);
     }
@@ -413,7 +459,8 @@ class EmbreeTracer final : public RayTracer {
     start(context, nullptr);
     intersect(rtc_scene_.get(), context, one);
     const bool found = one.hit.geomID != RTC_INVALID_GEOMETRY_ID;
-    take(query, found ? face_of(one.hit.instID[0], one.hit.geomID, one.hit.primID) : FaceRef{},
+    take(query,
+         found ? face_of(scene_, one.hit.instID[0], one.hit.geomID, one.hit.primID) : FaceRef{},
          one.ray.tfar);
   }
   void closest_packet(std::span<RayQuery> queries) const {
@@ -430,7 +477,8 @@ class EmbreeTracer final : public RayTracer {
       if (queries[i].failed) continue;
       const bool found = packet.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
       take(queries[i],
-           found ? face_of(packet.hit.instID[0][i], packet.hit.geomID[i], packet.hit.primID[i])
+           found ? face_of(scene_, packet.hit.instID[0][i], packet.hit.geomID[i],
+                           packet.hit.primID[i])
                  : FaceRef{},
            packet.ray.tfar[i]);
     }
@@ -477,69 +525,114 @@ class EmbreeTracer final : public RayTracer {
   bool is_traced(const Mesh& mesh, FaceRef face) const {
     return has_area(mesh, mesh.face(face.face)) && copies_.first(face) == face;
   }
-  Owned<RTCScene> make_scene() {
-    Owned<RTCScene> made(rtcNewScene(device_.get()));
-    errors_.check();
+  // A moving scene is traced at one time only: building quickly counts more.
+  RTCBuildQuality quality() const {
+    return is_moving(scene_) ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH;
+  }
+  static std::shared_ptr<EmbreeDevice> device_of(const Scene& scene) {
+    if (!scene.exposure || !scene.exposure->kept_shapes) return std::make_shared<EmbreeDevice>();
+    return {scene.exposure->kept_shapes, &scene.exposure->kept_shapes->device};
+  }
+  Owned<RTCScene> make_scene(RTCBuildQuality quality) {
+    Owned<RTCScene> made(rtcNewScene(device_->get()));
+    device_->check();
     rtcSetSceneFlags(made.get(),
                      static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | kFilterOfQuery));
-    // A moving scene is traced at one time only: building quickly counts more.
-    rtcSetSceneBuildQuality(made.get(),
-                            is_moving(scene_) ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH);
+    rtcSetSceneBuildQuality(made.get(), quality);
     return made;
   }
   // On the threads of this call alone.
   void commit(RTCScene rtc_scene, int threads) {
     parallel_for(1, threads, [&](size_t) { rtcJoinCommitScene(rtc_scene); });
-    errors_.check();
+    device_->check();
+  }
+  void attach(RTCScene rtc_scene, RTCGeometry geometry, uint32_t number) {
+    rtcAttachGeometryByID(rtc_scene, geometry, number);
+    device_->check();
+  }
+  Owned<RTCGeometry> make_instance(RTCScene of, const Vec3f (&columns)[4]) {
+    Owned<RTCGeometry> instance(rtcNewGeometry(device_->get(), RTC_GEOMETRY_TYPE_INSTANCE));
+    device_->check();
+    rtcSetGeometryInstancedScene(instance.get(), of);
+    rtcSetGeometryTransform(instance.get(), 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, columns);
+    rtcCommitGeometry(instance.get());
+    return instance;
   }
   // Slivers that lie askew get coordinates along their sides. Otherwise a ray may meet the
   // axis-aligned boxes of all faces of a cylinder.
-  void attach(const Mesh& mesh, ShapeId id, int threads) {
-    const auto frame = frame_of(mesh);
-    if (!frame) {
-      attach_to(rtc_scene_.get(), mesh, id, id.index(),
-                [&](const Vec3d& x) { return x - origin_; });
-      return;
-    }
+  Owned<RTCGeometry> make_shape(ShapeId id, int threads) {
+    const auto frame = frame_of(scene_.shape(id).mesh);
+    if (!frame) return make_triangles(id, [&](const Vec3d& x) { return x - origin_; });
     const auto& [center, axes, half] = *frame;
-    const Owned<RTCScene> own = make_scene();
-    attach_to(own.get(), mesh, id, 0, [&](const Vec3d& x) {
+    const Owned<RTCScene> own = make_scene(quality());
+    const Owned<RTCGeometry> triangles = make_triangles(id, [&](const Vec3d& x) {
       const Vec3d arm = x - center;
       return Vec3d{dot(axes[0], arm), dot(axes[1], arm), dot(axes[2], arm)};
     });
+    attach(own.get(), triangles.get(), 0);
     commit(own.get(), threads);
-    const Owned<RTCGeometry> instance(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_INSTANCE));
-    errors_.check();
-    rtcSetGeometryInstancedScene(instance.get(), own.get());
-    const Vec3f columns[4] = {cast<float>(axes[0]), cast<float>(axes[1]), cast<float>(axes[2]),
-                              cast<float>(center - origin_)};
-    rtcSetGeometryTransform(instance.get(), 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, columns);
-    attach_geometry(rtc_scene_.get(), instance.get(), id.index());
-  }
-  void attach_geometry(RTCScene rtc_scene, RTCGeometry geometry, uint32_t number) {
-    rtcCommitGeometry(geometry);
-    rtcAttachGeometryByID(rtc_scene, geometry, number);
-    errors_.check();
+    return make_instance(own.get(), {cast<float>(axes[0]), cast<float>(axes[1]),
+                                     cast<float>(axes[2]), cast<float>(center - origin_)});
   }
   template <class Place>
-  void attach_to(RTCScene rtc_scene, const Mesh& mesh, ShapeId id, uint32_t number,
-                 const Place& place) {
-    const Owned<RTCGeometry> geometry(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_TRIANGLE));
-    errors_.check();
+  Owned<RTCGeometry> make_triangles(ShapeId id, const Place& place) {
+    const Mesh& mesh = scene_.shape(id).mesh;
+    Owned<RTCGeometry> geometry(rtcNewGeometry(device_->get(), RTC_GEOMETRY_TYPE_TRIANGLE));
+    device_->check();
     auto* vertices = static_cast<Vec3f*>(
         rtcSetNewGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
                                 sizeof(Vec3f), mesh.positions.size()));
     auto* faces = static_cast<FaceIndices*>(
         rtcSetNewGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                                 sizeof(FaceIndices), mesh.faces.size()));
-    errors_.check();
+    device_->check();
     std::transform(mesh.positions.begin(), mesh.positions.end(), vertices,
                    [&](const Vec3f& x) { return cast<float>(place(cast<double>(x))); });
     for (uint32_t i = 0; i < mesh.faces.size(); ++i) {
       const FaceIndices& face = mesh.faces[i];
       faces[i] = is_traced(mesh, {id, FaceId(i)}) ? face : FaceIndices{face[0], face[0], face[0]};
     }
-    attach_geometry(rtc_scene, geometry.get(), number);
+    rtcCommitGeometry(geometry.get());
+    return geometry;
+  }
+  // Attaches what is kept of other times; returns which shapes these are. Duplicates depend on
+  // what moves.
+  std::vector<bool> attach_kept(int threads) {
+    std::vector<bool> none(scene_.shapes.size());
+    if (!scene_.exposure || !scene_.exposure->kept_shapes || !copies_.empty()) return none;
+    KeptShapes& kept = *scene_.exposure->kept_shapes;
+    const std::lock_guard lock(kept.mutex);
+    if (!kept.holds(scene_, origin_)) keep(kept, threads);
+    for (const auto& [number, geometry] : kept.geometries) {
+      attach(rtc_scene_.get(), geometry.get(), number);
+    }
+    return kept.still;
+  }
+  void keep(KeptShapes& kept, int threads) {
+    kept.origin = origin_;
+    kept.positions.clear();
+    kept.geometries.clear();
+    size_t faces = 0;
+    for (uint32_t i = 0; i < scene_.shapes.size(); ++i) {
+      const Mesh& mesh = scene_.shapes[i].mesh;
+      kept.positions.push_back(mesh.positions);
+      if (!kept.still[i]) continue;
+      kept.geometries.emplace_back(i, make_shape(ShapeId(i), threads));
+      faces += mesh.faces.size();
+    }
+    // Rays take longer into an instance than it takes to build anew what has fewer. Not tuned.
+    constexpr size_t kMany = 4096;
+    if (faces < kMany) return;
+    const Owned<RTCScene> all = make_scene(RTC_BUILD_QUALITY_HIGH);
+    std::erase_if(kept.geometries, [&](const auto& shape) {
+      const bool alone = frame_of(scene_.shapes[shape.first].mesh).has_value();
+      if (!alone) attach(all.get(), shape.second.get(), shape.first);
+      return !alone;
+    });
+    commit(all.get(), threads);
+    kept.geometries.emplace_back(
+        static_cast<uint32_t>(scene_.shapes.size()),
+        make_instance(all.get(), {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0, 0, 0}}));
   }
   Context make_context(const Ray& ray) const {
     Context context;
@@ -562,11 +655,10 @@ class EmbreeTracer final : public RayTracer {
   const DuplicateFaces& copies_;
   const FaceOverlaps& overlaps_;
   bool settles_;  // duplicates, coplanar or near faces exist
+  Bounds bounds_;
   Vec3d origin_;  // origin of Embree's coordinates
   double reach_;
-  double clearance_;     // of the starts of rays that are traced together
-  EmbreeErrors errors_;  // must be declared before the device that reports to it
-  Owned<RTCDevice> device_;
+  std::shared_ptr<EmbreeDevice> device_;
   Owned<RTCScene> rtc_scene_;
 };
 
@@ -575,19 +667,16 @@ class EmbreeBlurTracer final : public BlurTracer {
  public:
   EmbreeBlurTracer(const BlurFaces& faces, int threads)
       : faces_(faces),
-        origin_(origin_of(faces.scene())),
-        pieces_(faces.scene().shapes.size()),
-        device_(rtcNewDevice(nullptr)) {
-    if (!device_) throw InputError("Embree cannot start on this machine");
-    rtcSetDeviceErrorFunction(device_.get(), EmbreeErrors::note, &errors_);
+        origin_(origin_of(faces.scene(), bounds_of(faces.scene()))),
+        pieces_(faces.scene().shapes.size()) {
     rtc_scene_.reset(rtcNewScene(device_.get()));
-    errors_.check();
+    device_.check();
     rtcSetSceneFlags(rtc_scene_.get(),
                      static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | kFilterOfQuery));
     rtcSetSceneBuildQuality(rtc_scene_.get(), RTC_BUILD_QUALITY_MEDIUM);
     for (uint32_t s = 0; s < pieces_.size(); ++s) attach(ShapeId(s));
     parallel_for(1, threads, [&](size_t) { rtcJoinCommitScene(rtc_scene_.get()); });
-    errors_.check();
+    device_.check();
   }
 
   void hits(const Ray& ray, std::vector<BlurHit>& hits) const override {
@@ -658,26 +747,25 @@ class EmbreeBlurTracer final : public BlurTracer {
       }
     }
     const Owned<RTCGeometry> geometry(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_TRIANGLE));
-    errors_.check();
+    device_.check();
     auto* vertices = static_cast<Vec3f*>(
         rtcSetNewGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
                                 sizeof(Vec3f), corners.size()));
     auto* faces = static_cast<FaceIndices*>(
         rtcSetNewGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                                 sizeof(FaceIndices), corners.size() / 3));
-    errors_.check();
+    device_.check();
     std::copy(corners.begin(), corners.end(), vertices);
     for (uint32_t k = 0; k < corners.size() / 3; ++k) faces[k] = {3 * k, 3 * k + 1, 3 * k + 2};
     rtcCommitGeometry(geometry.get());
     rtcAttachGeometryByID(rtc_scene_.get(), geometry.get(), id.index());
-    errors_.check();
+    device_.check();
   }
 
   const BlurFaces& faces_;
   Vec3d origin_;
   std::vector<std::vector<uint32_t>> pieces_;  // of each shape: the face of each triangle
-  EmbreeErrors errors_;                        // must be declared before the device
-  Owned<RTCDevice> device_;
+  EmbreeDevice device_;
   Owned<RTCScene> rtc_scene_;
 };
 

@@ -42,7 +42,6 @@ FaceTree::FaceTree(const Scene& scene) {
     }
   }
   if (!items_.empty()) build(0, static_cast<uint32_t>(items_.size()));
-  find_neighbours();
 }
 
 void FaceTree::find_neighbours() {

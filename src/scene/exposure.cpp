@@ -162,35 +162,25 @@ void carry(Camera& camera, const Carrier& carrier) {
   }
 }
 
-// Whether a box is clear of all faces of a mesh.
-bool is_clear(const Bounds& box, const Mesh& mesh) {
+// Whether a box is clear of all faces of a mesh, and not near to them.
+bool is_clear(Bounds box, const Mesh& mesh, const Vec3d& viewer) {
+  const Bounds bounds = bounds_of(mesh);
+  constexpr double kNear = 0x1p-18;  // twice the blur of near faces
+  const double far = length(viewer) + length(bounds.lower) + length(bounds.upper);
+  const Vec3d margin = Vec3d{1, 1, 1} * (kNear * far);
+  box = {box.lower - margin, box.upper + margin};
   const auto meets = [&](const Bounds& other) {
     for (int k = 0; k < 3; ++k) {
       if (box.lower[k] > other.upper[k] || box.upper[k] < other.lower[k]) return false;
     }
     return true;
   };
-  if (!meets(bounds_of(mesh))) return true;
+  if (!meets(bounds)) return true;
   return std::ranges::none_of(mesh.faces, [&](const FaceIndices& face) {
-    Bounds bounds;
-    for (const uint32_t v : face) bounds.extend(cast<double>(mesh.positions[v]));
-    return meets(bounds);
+    Bounds corners;
+    for (const uint32_t v : face) corners.extend(cast<double>(mesh.positions[v]));
+    return meets(corners);
   });
-}
-
-// Whether all shapes that move are clear of all others.
-bool is_apart(const Scene& scene) {
-  for (size_t s = 0; s < scene.shapes.size(); ++s) {
-    if (!scene.exposure->shapes[s].moves()) continue;
-    Bounds box = bounds_of(scene.shapes[s].mesh);
-    constexpr double kMargin = 1e-3;  // of its size, far above rounding; not tuned
-    const Vec3d margin = Vec3d{1, 1, 1} * (kMargin * box.diagonal());
-    box = {box.lower - margin, box.upper + margin};
-    for (size_t other = 0; other < scene.shapes.size(); ++other) {
-      if (other != s && !is_clear(box, scene.shapes[other].mesh)) return false;
-    }
-  }
-  return true;
 }
 
 Dual time_of(const Scene& scene, double u) {
@@ -255,6 +245,21 @@ Scene at_time(const Scene& scene, double u) {
   return there;
 }
 
+bool is_apart(const Scene& scene, const std::vector<bool>& moving) {
+  const Vec3d viewer = value(scene.camera.origin);
+  for (size_t s = 0; s < scene.shapes.size(); ++s) {
+    if (!moving[s]) continue;
+    Bounds box = bounds_of(scene.shapes[s].mesh);
+    constexpr double kMargin = 1e-3;  // of its size, far above rounding; not tuned
+    const Vec3d margin = Vec3d{1, 1, 1} * (kMargin * box.diagonal());
+    box = {box.lower - margin, box.upper + margin};
+    for (size_t other = 0; other < scene.shapes.size(); ++other) {
+      if (other != s && !is_clear(box, scene.shapes[other].mesh, viewer)) return false;
+    }
+  }
+  return true;
+}
+
 void set_time(Scene& scene, double u) {
   if (!scene.exposure) return;
   const Exposure& exposure = *scene.exposure;
@@ -267,10 +272,14 @@ void set_time(Scene& scene, double u) {
   const Course course = course_of_camera(scene);
   const Carrier carrier(course, exposure.reference, time);
   if (course.moves() || carrier.seeded()) carry(scene.camera, carrier);
-  if (exposure.no_overlaps && !is_apart(scene)) own_exposure(scene).no_overlaps = nullptr;
+  if (!exposure.no_overlaps) return;
+  std::vector<bool> moving;
+  for (const Course& own : exposure.shapes) moving.push_back(own.moves());
+  if (!is_apart(scene, moving)) own_exposure(scene).no_overlaps = nullptr;
 }
 
-void find_overlaps(Scene& scene, int threads) {
+void share_between_times(Scene& scene, int threads) {
+  own_exposure(scene).kept_shapes = make_kept_shapes();
   const auto faces = std::make_shared<const CoincidentFaces>(scene, threads);
   if (faces->copies.empty() && faces->overlaps.empty()) own_exposure(scene).no_overlaps = faces;
 }

@@ -40,9 +40,12 @@ class BlurFaces {
  private:
   struct MeshFaces {
     bool front_only = false;
+    std::vector<Vec3d> normals;   // of each face, twice its area long
     std::vector<uint32_t> first;  // of each vertex that stands for its copies, in `around`
     std::vector<uint32_t> around;
   };
+  // Of the point x of the plane of a face. n: its normal, of any length.
+  double opacity_at(const std::array<Vec3d, 3>& corners, const Vec3d& n, const Vec3d& x) const;
   bool is_beside_start(const Ray& ray, FaceRef face, const std::array<Vec3d, 3>& corners) const;
 
   const Scene& scene_;

@@ -13,6 +13,7 @@
 namespace limn {
 
 struct CoincidentFaces;  // face_overlaps.h
+struct KeptShapes;       // embree_tracer.cpp
 struct Parameter;        // parameter.h
 
 struct Keyframe {
@@ -51,6 +52,8 @@ struct Exposure {
   std::vector<Course> shapes;     // of each shape
   // Empty if the scene is known to have no coincident faces; else null.
   std::shared_ptr<const CoincidentFaces> no_overlaps;
+  // What ray tracers of the scene at several times share; else null.
+  std::shared_ptr<KeptShapes> kept_shapes;
 };
 
 // Whether images of the scene are means over times: something moves while the sensor's shutter is
@@ -69,9 +72,14 @@ void check_still(const Scene& scene, const std::string& what,
 Scene at_time(const Scene& scene, double u);
 // As at_time(), in place. The scene must be at the reference time.
 void set_time(Scene& scene, double u);
-// Tests once whether faces coincide. If none do, at_time() skips the test at times at which moving
-// shapes are clear of all others. The scene must outlive this knowledge, at its address.
-void find_overlaps(Scene& scene, int threads);
+// Whether shapes are clear of all others: none of their faces touch or cross, or are so near that
+// rays in floats from the camera might not tell them apart. moving: of each shape.
+bool is_apart(const Scene& scene, const std::vector<bool>& moving);
+// For a scene at several times: at_time() and tracers share from now on what they find of shapes
+// that stand still. Tests whether faces coincide: if none do, the test is skipped at times at which
+// moving shapes are clear of all others. The scene must outlive this knowledge, at its address.
+void share_between_times(Scene& scene, int threads);
+std::shared_ptr<KeptShapes> make_kept_shapes();
 // The matrix from the derivative with respect to a shape's vertex at the time u to that with
 // respect to the vertex at the reference time.
 Matrix4 pulls_back(const Scene& scene, ShapeId shape, double u);

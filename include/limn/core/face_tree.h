@@ -22,7 +22,8 @@ class FaceTree {
     FaceRef face;
     std::array<Vec3f, 3> corners;
     // Indices of the items across its sides (side k goes from corner k to the next). kNone unless
-    // exactly one other item shares the side, with consistent winding.
+    // exactly one other item shares the side, with consistent winding, and find_neighbours() was
+    // called.
     std::array<uint32_t, 3> neighbours;
   };
   static constexpr uint32_t kNone = UINT32_MAX;
@@ -31,6 +32,7 @@ class FaceTree {
   // Appends all faces that intersect the set, conservatively: every face that is not entirely
   // outside of one half-space. The order depends on the scene alone.
   void list(std::span<const HalfSpace> set, std::vector<const Item*>& faces) const;
+  void find_neighbours();
 
  private:
   struct Node {
@@ -38,7 +40,6 @@ class FaceTree {
     uint32_t first, count;  // range of items; count 0: the children are the next node and `first`
   };
   uint32_t build(uint32_t first, uint32_t last);
-  void find_neighbours();
 
   std::vector<Item> items_;
   std::vector<Node> nodes_;
