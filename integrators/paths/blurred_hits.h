@@ -32,11 +32,13 @@ class BlurredHits {
   BlurredHits(const BlurredScene& scene, RayCount& rays)
       : s_(scene), scene_(scene.scene()), rays_(rays) {}
 
-  // Draws one of the surfaces that the ray meets by its weight; u: uniform in [0, 1).
-  size_t draw(const BlurredRay<S>& ray, double u) {
+  // Draws one of the surfaces that the ray meets by its weight; rng: its next number chooses.
+  size_t draw(const BlurredRay<S>& ray, Rng rng) {
     ++rays_.closest;
     const size_t met = look(ray);
     size_t k = 0;
+    if (value(weights_[0]) == 1) return k;
+    double u = rng.uniform();
     while (k + 1 < met && u >= value(weights_[k])) u -= value(weights_[k++]);
     return k;
   }

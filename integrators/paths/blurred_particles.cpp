@@ -100,7 +100,7 @@ class BlurredParticles::Particle {
 
   // One of the faces that the ray meets, by its weight, whose derivative is a factor.
   std::optional<FaceRef> draw(Rng rng) {
-    const size_t k = hits_.draw(ray_, rng.uniform());
+    const size_t k = hits_.draw(ray_, rng);
     const S& weight = hits_.weight(k);
     flux_ = flux_ * (weight * (1 / value(weight)));
     return hits_.face(k);

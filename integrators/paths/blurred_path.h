@@ -61,8 +61,7 @@ class BlurredPath {
 
   // Draws one of the surfaces that the ray meets, and traces another, too.
   Face draw() {
-    Rng rng = key_.at(Purpose::kEdgeSide, ray_.bounces);
-    const size_t k = hits_.draw(ray_, rng.uniform());
+    const size_t k = hits_.draw(ray_, key_.at(Purpose::kEdgeSide, ray_.bounces));
     if constexpr (!kPlain) pair_with(k);
     return hits_.face(k);
   }
@@ -151,7 +150,7 @@ class BlurredPath {
     if (scattering.is_rough()) sum_ += throughput_ * direct(next, scattering);
     Rng rng = key_.at(Purpose::kBsdf, ray_.bounces);
     const double u = rng.uniform(), v = rng.uniform();
-    if (const auto smooth = draw_smooth(scattering, rng.uniform())) {
+    if (const auto smooth = draw_smooth(scattering, rng)) {
       next.direction = smooth->wo;
       next.caustic = ray_.caustic;
       throughput_ = throughput_ * smooth->weight;
@@ -173,9 +172,10 @@ class BlurredPath {
 
   // A smooth ray, its weight over its probability; none for the rough lobes. It moves with the
   // surface, and no light that is drawn comes its way.
-  static std::optional<SmoothRay<S>> draw_smooth(const Scattering<S>& scattering, double u) {
+  static std::optional<SmoothRay<S>> draw_smooth(const Scattering<S>& scattering, Rng& rng) {
     if (!scattering.is_smooth()) return {};
     const SmoothShares shares = scattering.shares();
+    double u = rng.uniform();
     const std::optional<int> k = detail::choose_smooth(shares, u);
     if (!k) return {};
     SmoothRay<S> ray = scattering.smooth_ray(*k);

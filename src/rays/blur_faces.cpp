@@ -29,6 +29,23 @@ bool is_closed(const Mesh& mesh) {
   });
 }
 
+// Whether no side of the face `a` has all corners of `b`, in its plane, on its outer side.
+bool reaches_into(const std::array<Vec3d, 3>& a, const std::array<Vec3d, 3>& b) {
+  const Vec3d n = cross(a[1] - a[0], a[2] - a[0]);
+  constexpr double kRounding = 1e-12;
+  for (int k = 0; k < 3; ++k) {
+    const Vec3d in = cross(n, a[(k + 1) % 3] - a[k]);
+    const auto is_out = [&](const Vec3d& x) {
+      return dot(in, x - a[k]) <= kRounding * length(in) * length(x - a[k]);
+    };
+    if (std::ranges::all_of(b, is_out)) return false;
+  }
+  return true;
+}
+bool overlap(const std::array<Vec3d, 3>& a, const std::array<Vec3d, 3>& b) {
+  return reaches_into(a, b) && reaches_into(b, a);
+}
+
 bool before(const BlurHit& a, const BlurHit& b) {
   if (a.t != b.t) return a.t < b.t;
   if (a.face.shape != b.face.shape) return a.face.shape < b.face.shape;
@@ -62,7 +79,30 @@ BlurFaces::BlurFaces(const Scene& scene, const Blur& blur)
     for (const uint32_t f : faces) {
       for (const uint32_t v : mesh.faces[f]) own.around[next[mesh.weld[v]]++] = f;
     }
+    own.alone.resize(mesh.faces.size());
+    for (const uint32_t f : faces) own.alone[f] = is_alone(mesh, own, f);
   }
+}
+
+// A ray that comes from the front of a plane has crossed it before it meets what lies behind it;
+// where it meets a face in the same plane, that is where it met the first.
+bool BlurFaces::is_alone(const Mesh& mesh, const MeshFaces& own, uint32_t face) {
+  const auto corners = face_corners<double>(mesh, FaceId(face));
+  for (const uint32_t v : mesh.faces[face]) {
+    for (uint32_t i = own.first[mesh.weld[v]]; i < own.first[mesh.weld[v] + 1]; ++i) {
+      const uint32_t other = own.around[i];
+      if (other == face) continue;
+      const auto beside = face_corners<double>(mesh, FaceId(other));
+      bool in_plane = true;
+      for (const Vec3d& x : corners) {
+        const double above = dot(own.normals[other], x - beside[0]);
+        if (own.front_only ? above > 0 : above != 0) return false;
+        in_plane = in_plane && above == 0;
+      }
+      if (in_plane && overlap(corners, beside)) return false;
+    }
+  }
+  return true;
 }
 
 bool BlurFaces::touch(FaceRef a, FaceRef b) const {
@@ -141,6 +181,7 @@ void BlurFaces::settle(const Ray& ray, std::vector<BlurHit>& hits) const {
   std::erase_if(hits, [&](const BlurHit& hit) { return hit.t > last; });
   const Mesh& mesh = scene_.shape(face.shape).mesh;
   const MeshFaces& own = meshes_[face.shape.index()];
+  if (own.alone[face.face.index()]) return;
   const size_t count = hits.size();
   Ray behind = ray;
   behind.t_min = std::max(ray.t_min, last);
