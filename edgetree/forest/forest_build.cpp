@@ -392,9 +392,8 @@ uint32_t append_motion(const EdgeMesh& mesh, const Lanes& lane_scale, Forest& fo
 
 }  // namespace
 
-// Of each object.
 struct KeptTrees {
-  std::vector<std::vector<KeptTree>> objects;
+  std::vector<std::vector<KeptTree>> objects;  // the trees of each object
 };
 
 // The trees of an object that are kept, or to be kept; null: it is not shared.

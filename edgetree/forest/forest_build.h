@@ -40,7 +40,8 @@ void for_trees_of(const EdgeMesh& mesh, ShapeId object, bool cull_concave, const
     if (groups[g].size() > 0) append(groups[g], object, static_cast<ForestGroup>(g));
   }
 }
-// The same of every object, after giving `trees` (Forest, QuadricForest) a slot for every edge.
+// Does the same for every object, after giving `trees` (Forest, QuadricForest) a slot for every
+// edge.
 template <class Trees, class Append>
 void for_every_tree(const EdgeSamplerInput& input, bool cull_concave, Trees& trees,
                     const Append& append) {
@@ -55,7 +56,7 @@ void for_every_tree(const EdgeSamplerInput& input, bool cull_concave, Trees& tre
 NodeFrame frame_of(const Bounds& box);
 
 // Builds one tree per object and group with edges. The result does not depend on `threads`, nor on
-// what is shared.
+// `shared`.
 Forest build_forest(const EdgeSamplerInput& input, int threads, const ForestConfig& config,
                     SharedObjects* shared = nullptr);
 

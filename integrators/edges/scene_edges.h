@@ -22,11 +22,11 @@ class KeptEdges {
  public:
   // As make_scene_edges(), of the scene at a time.
   EdgeSamplerInput make(const Scene& scene, int threads);
-  // Of the input that was made last; null: nothing is.
+  // What samplers may keep of the input that make() returned last; null: nothing.
   SharedObjects* shared() { return shared_ ? &*shared_ : nullptr; }
 
  private:
-  // Of a shape, as it was when still_ was made.
+  // The mesh of a shape, as it was when still_ was made.
   struct Kept {
     SharedVector<Vec3f> positions;
     SharedVector<Vec3d> normals;

@@ -74,7 +74,7 @@ struct FilmSample {
   // What turns of directions at the first vertex add (DirectionField::turn): amount times this.
   Rgb<double> amount{};
   Vec3d per_turn{};
-  // Of a particle: its light, of which `value` is the derivative, and how its position moves.
+  // A particle has a radiance, with the derivative `value`, and a position on the film that moves.
   Rgb<double> radiance{};
   FilmMotion moves{};
 

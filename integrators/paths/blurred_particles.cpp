@@ -78,8 +78,8 @@ class BlurredParticles::Particle {
     flux_ = detail::emitter_radiance<S>(shape, face.shape) *
             (projected * constant * hits_.unhidden(onto, face));
   }
-  // One of several points of a piece, drawn by its opacity, and the mean opacity over its own. Most
-  // of what a small light is enlarged to is nearly clear.
+  // One of several points of a piece, drawn by its opacity, and the mean opacity over its own. A
+  // small light is enlarged to much more than itself, which is nearly transparent.
   std::pair<Vec3d, double> draw_point(FaceRef piece, const std::array<Vec3d, 3>& corners,
                                       Rng& rng) const {
     constexpr int kPoints = 8;  // not tuned
@@ -201,7 +201,7 @@ BlurredParticles::BlurredParticles(const BlurredScene& scene) : scene_(scene) {
     const Mesh& mesh = emitters.shapes[s].mesh;
     const auto radiance = detail::emitter_radiance<Dual>(emitters.shapes[s], ShapeId(s));
     if (mesh.faces.empty() || detail::stays_black(radiance)) continue;
-    // What is black as yet may begin to shine.
+    // A light that is black may have a radiance that grows.
     const double bright = luminance(value(radiance)) > 0 ? luminance(value(radiance)) : 1;
     for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
       const auto c = face_corners<double>(mesh, FaceId(f));

@@ -105,7 +105,7 @@ class BlurredPath {
     const Vec3d wo = value(ray_.direction);
     const Rgb<S> radiance = detail::emission<S>(surface, -wo, scene_.shading);
     if (detail::stays_black(radiance)) return {};
-    // Of caustics, particles find it (blurred_particles.h).
+    // Particles bring this light instead (blurred_particles.h).
     if (ray_.pdf == 0) return s_.blur().particles && ray_.caustic ? Rgb<S>() : radiance;
     const double distance = length(value(surface.p) - value(ray_.origin));
     return radiance * share_seen(s_.lights().pdf(ray_.lights, surface.face.shape,

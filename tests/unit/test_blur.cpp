@@ -262,8 +262,7 @@ TEST(BlurWeights, DoNotDependOnCopiesAlongSeams) {
   }
 }
 
-// Embree finds what brute force finds, from anywhere and from faces.
-// By definition: in order, and nothing behind the first opaque face but its neighbours.
+// Sorts hits, and drops all behind the first opaque face but its neighbours, by the definition.
 void leave_out_hidden(const BlurFaces& faces, std::vector<BlurHit>& hits) {
   std::ranges::sort(hits, [](const BlurHit& a, const BlurHit& b) {
     return std::tuple(a.t, a.face.shape, a.face.face) < std::tuple(b.t, b.face.shape, b.face.face);
@@ -276,6 +275,7 @@ void leave_out_hidden(const BlurFaces& faces, std::vector<BlurHit>& hits) {
   });
 }
 
+// Embree finds what brute force finds, from anywhere and from faces.
 TEST(BlurTracer, FindsWhatBruteForceFinds) {
   size_t found = 0, rays = 0;
   for (const NamedMesh& named : test_meshes()) {

@@ -46,7 +46,7 @@ class BlurFaces {
     std::vector<bool> alone;  // of each face: where it is opaque, none around it is met behind it
   };
   static bool is_alone(const Mesh& mesh, const MeshFaces& own, uint32_t face);
-  // Of the point x of the plane of a face. n: its normal, of any length.
+  // The opacity of a face where a ray meets its plane, at x. n: the face's normal, of any length.
   double opacity_at(const std::array<Vec3d, 3>& corners, const Vec3d& n, const Vec3d& x) const;
   bool is_beside_start(const Ray& ray, FaceRef face, const std::array<Vec3d, 3>& corners) const;
 

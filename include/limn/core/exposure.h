@@ -52,7 +52,7 @@ struct Exposure {
   std::vector<Course> shapes;     // of each shape
   // Empty if the scene is known to have no coincident faces; else null.
   std::shared_ptr<const CoincidentFaces> no_overlaps;
-  // What ray tracers of the scene at several times share; else null.
+  // The geometry of still shapes, which ray tracers of several times share; null: each has its own.
   std::shared_ptr<KeptShapes> kept_shapes;
 };
 
@@ -72,8 +72,8 @@ void check_still(const Scene& scene, const std::string& what,
 Scene at_time(const Scene& scene, double u);
 // As at_time(), in place. The scene must be at the reference time.
 void set_time(Scene& scene, double u);
-// Whether shapes are clear of all others: none of their faces touch or cross, or are so near that
-// rays in floats from the camera might not tell them apart. moving: of each shape.
+// Whether no face of a moving shape touches or crosses one of another shape, or is so near to one
+// that a ray from the camera, in floats, might not tell them apart. moving: a flag for each shape.
 bool is_apart(const Scene& scene, const std::vector<bool>& moving);
 // For a scene at several times: at_time() and tracers share from now on what they find of shapes
 // that stand still. Tests whether faces coincide: if none do, the test is skipped at times at which
