@@ -57,6 +57,17 @@ def commit_line():
     return f"Figures: commit `{commit or 'unknown'}`."
 
 
+def labelled(picture, text, size=15):
+    """The picture with a line of text above it, `size` pixels high."""
+    from PIL import Image, ImageDraw, ImageFont
+
+    top = size + 9
+    whole = Image.new("RGB", (picture.width, picture.height + top), "white")
+    whole.paste(picture, (0, top))
+    ImageDraw.Draw(whole).text((4, 3), text, "black", ImageFont.truetype("DejaVuSans.ttf", size))
+    return whole
+
+
 def read_json(file):
     """None if it cannot be read."""
     try:

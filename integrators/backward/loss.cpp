@@ -7,6 +7,7 @@
 
 #include "integrators/methods/render_seeds.h"
 #include "limn/core/error.h"
+#include "limn/core/image.h"
 #include "limn/core/names.h"
 #include "limn/integrators/backward.h"
 #include "limn/integrators/methods.h"
@@ -15,16 +16,35 @@ namespace limn {
 
 namespace {
 
+// Of srgb_encode().
+double srgb_slope(double linear) {
+  return linear <= kSrgbLinear ? 12.92 : 1.055 / 2.4 * std::pow(linear, 1 / 2.4 - 1);
+}
+
 // Of one value: the loss of two independent estimates, and the derivative of what their mean makes.
 struct ValueLoss {
   double loss, adjoint;
 };
 ValueLoss value_loss(LossKind kind, double a, double b, double target) {
-  const double mean = 0.5 * (a + b) - target;
-  if (kind == LossKind::kL1) return {std::fabs(mean), mean > 0 ? 1.0 : mean < 0 ? -1.0 : 0.0};
-  // The constant keeps dark pixels from ruling the sum; not tuned.
-  const double weight = kind == LossKind::kL2 ? 1 : 1 / (target * target + 0.01);
-  return {weight * (a - target) * (b - target), 2 * weight * mean};
+  constexpr double kDark = 0.01;  // keeps dark pixels from ruling the sum; not tuned
+  const double image = 0.5 * (a + b), off = image - target;
+  const double distance = std::fabs(off);
+  const double sign = off > 0 ? 1.0 : off < 0 ? -1.0 : 0.0;
+  switch (kind) {
+    case LossKind::kL2: return {(a - target) * (b - target), 2 * off};
+    case LossKind::kRelativeL2: {
+      const double weight = 1 / (target * target + kDark);
+      return {weight * (a - target) * (b - target), 2 * weight * off};
+    }
+    case LossKind::kL1: return {distance, sign};
+    case LossKind::kL1Srgb:
+      return {std::fabs(srgb_encode(image) - srgb_encode(target)), sign * srgb_slope(image)};
+    case LossKind::kSmape: {
+      const double sum = std::fabs(image) + std::fabs(target) + kDark;
+      return {distance / sum, (sign - distance / sum * (image < 0 ? -1 : 1)) / sum};
+    }
+  }
+  return {};
 }
 
 void check_size(const Scene& scene, const Image& image, const char* what,
@@ -165,6 +185,13 @@ int most_pyramid_levels(const Scene& scene) {
     ++levels;
   }
   return levels;
+}
+
+std::string bias_warning(LossKind kind) {
+  return fmt::format(
+      "the gradient of {} is biased where the image's noise is not small beside its difference "
+      "from the target",
+      kLosses[static_cast<int>(kind)]);
 }
 
 LossResult image_loss(const Scene& scene, const Image& target, const LossOptions& options,

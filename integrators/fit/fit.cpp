@@ -138,11 +138,7 @@ Fit::Impl::Impl(std::vector<FitView> all, const FitOptions& options, const RunSe
   if (!over_faces()) {
     warn_of_hair_gaps(views[0].scene, settings.spp, settings.threads, warnings);
   }
-  if (options.loss == LossKind::kL1 && !over_faces()) {
-    warnings.push_back(
-        "the gradient of l1 is biased where the image's noise is not small beside its difference "
-        "from the target");
-  }
+  if (!is_unbiased(options.loss) && !over_faces()) warnings.push_back(bias_warning(options.loss));
 }
 
 void Fit::Impl::check_shapes() {

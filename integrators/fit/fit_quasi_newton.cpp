@@ -19,8 +19,10 @@ void Fit::Impl::check_exact() {
         "are noisy: take the method analytic, or the optimiser adam-uniform",
         options_.backward.method.name()));
   }
-  if (options_.loss == LossKind::kL1) {
-    throw InputError("the optimiser lbfgs needs a smooth loss: take l2 or relative-l2, not l1");
+  if (!is_unbiased(options_.loss)) {
+    throw InputError(fmt::format(
+        "the optimiser lbfgs needs a smooth loss: take l2 or relative-l2, not {}",
+        kLosses[static_cast<int>(options_.loss)]));
   }
   if (options_.spp_doubling > 0 || options_.step_half_life > 0 || options_.loss_spp > 0) {
     throw InputError(

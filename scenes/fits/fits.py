@@ -33,7 +33,7 @@ HERE = os.path.dirname(os.path.abspath(__file__))
 ROOT = os.path.dirname(os.path.dirname(HERE))
 sys.path.insert(0, os.path.join(ROOT, "tools"))
 
-from common import read_json  # noqa: E402
+from common import labelled, read_json  # noqa: E402
 from report.python import use_one_with_matplotlib  # noqa: E402
 
 BUNNY = "/usr/share/glmark2/models/bunny.obj"
@@ -512,10 +512,10 @@ def bad_starts(fits, _):
     """Targets, exact and blurred fits, step by step."""
     from PIL import Image
 
-    names, tile, across = fits.chosen(REGULARISED), 72, 5
+    names, tile, high, across = fits.chosen(REGULARISED), 72, 90, 5
     frames, rows = [], []
     for step in range(0, 95, 5):
-        frame = Image.new("RGB", (across * 3 * tile, -(-len(names) // across) * tile), "white")
+        frame = Image.new("RGB", (across * 3 * tile, -(-len(names) // across) * high), "white")
         for i, name in enumerate(names):
             for k, variant in enumerate(("target", "exact", "blurred")):
                 folder = folder_of(name, f"{'exact' if k == 0 else variant} 1")
@@ -523,8 +523,9 @@ def bad_starts(fits, _):
                 file = "view_0_target.png" if k == 0 else f"step_{at:05}_view_0.png"
                 picture = Image.open(fits.path(folder, file)).convert("RGB")
                 size = (tile - 2, (tile - 2) * picture.height // picture.width)
-                frame.paste(picture.resize(size, Image.Resampling.NEAREST),
-                            ((i % across * 3 + k) * tile, i // across * tile))
+                picture = picture.resize(size, Image.Resampling.NEAREST)
+                frame.paste(labelled(picture, (name, "", variant)[k], 9),
+                            ((i % across * 3 + k) * tile, i // across * high))
         frames.append(frame)
         rows.append([step, len(names)])
     frames[0].save(os.path.join(ROOT, "scenes", "pictures", "bad_starts.webp"), quality=60,
@@ -537,38 +538,51 @@ SIGMAS, GAMMAS = ("0.04", "0.01", "0.0025", "0.0006", "0.00015"), ("1.6", "0.4",
 
 
 def sweeps(fits, _):
-    """After Quinn 2021, Figs. 5.16 and 5.2: derivatives against sigma, images against gamma."""
+    """After Quinn 2021, Figs. 5.16, 5.2 and 5.15: derivatives against sigma, images against gamma,
+    the derivative of a caustic."""
     from PIL import Image
 
     regularised_files(fits)
-    torus, room = scene("../regularised/torus"), scene("../regularised/room")
+    torus, room, lens = (scene(f"../regularised/{name}") for name in ("torus", "room", "lens"))
     size = ["width=64", "height=64"]
     mesh = [f"mesh={os.path.abspath(fits.path('torus.obj'))}", "format=obj"]
-    folder, rows, tiles = fits.path("sweep"), [], [[], [], []]
+    pane = [d.replace("OUT", os.path.abspath(fits.out)) for d in ["format=obj", *OVER_LAMP]]
+    folder, rows, tiles = fits.path("sweep"), [], [[], [], [], []]
 
-    def image(row, file, defines, options):
+    def show(row, label, file):
+        tile = Image.open(file).convert("RGB").resize((128, 128), Image.Resampling.NEAREST)
+        tiles[row].append(labelled(tile, label, 11))
+
+    def image(row, label, file, defines, options):
         fits.run("render", file, *defined(size + defines), *options.split(), "-o", f"{folder}.exr")
-        tiles[row].append(Image.open(f"{folder}.png").convert("RGB"))
+        show(row, label, f"{folder}.png")
 
     for sigma in SIGMAS:
-        image(0, torus, mesh, f"--spp 64 --method blurred --sigma {sigma}")
+        image(0, f"σ {sigma}", torus, mesh, f"--spp 64 --method blurred --sigma {sigma}")
         fits.run("compare", torus, *defined(size + mesh), "--wrt", "torus.translate.x", "--methods",
                  "blurred,adaptive", "--sigma", sigma, "--time", "1", "--repeats", "5",
                  "--no-report", "-o", folder)
-        tiles[1].append(Image.open(os.path.join(folder, "blurred.png")).convert("RGB"))
+        show(1, "derivative", os.path.join(folder, "blurred.png"))
         found = read_json(os.path.join(folder, "compare.json"))["methods"]
         rows.append([sigma, *(f"{math.sqrt(m['summary'][0]['relative_mse']):.4f}" for m in found),
                      f"{found[0]['summary'][0]['bias']['p']:.2g}"])
-    image(0, torus, mesh, "--spp 64")
-    tiles[1].append(Image.open(os.path.join(folder, "reference.png")).convert("RGB"))
+    image(0, "sharp", torus, mesh, "--spp 64")
+    show(1, "derivative", os.path.join(folder, "reference.png"))
     for gamma in GAMMAS:
-        image(2, room, [], f"--spp 64 --method blurred --sigma 0.002 --gamma {gamma}")
-    image(2, room, [], "--spp 64 --method blurred --sigma 0.002")
-    image(2, room, [], "--spp 64")
-    sheet = Image.new("RGB", (6 * 130, 3 * 130), "white")
+        image(2, f"γ {gamma}", room, [], f"--spp 64 --method blurred --sigma 0.002 --gamma {gamma}")
+    image(2, "γ 0", room, [], "--spp 64 --method blurred --sigma 0.002")
+    image(2, "sharp", room, [], "--spp 64")
+    image(3, "caustic", lens, pane, "--spp 256 --method light-traced")
+    for method in ("blurred:caustics=particles", "blurred"):
+        for axis in "xz":
+            fits.run("gradient", lens, *defined(size + pane), "--wrt", f"pane.translate.{axis}",
+                     "--method", method, "--sigma", "0.0025", "--spp", "256", "-o", f"{folder}.exr")
+            show(3, f"{'particles' if 'particles' in method else 'paths'}: by {axis}", f"{folder}.png")
+    high, wide = tiles[0][0].height + 2, 130
+    sheet = Image.new("RGB", (6 * wide, len(tiles) * high), "white")
     for y, row in enumerate(tiles):
         for x, tile in enumerate(row):
-            sheet.paste(tile.resize((128, 128), Image.Resampling.NEAREST), (x * 130, y * 130))
+            sheet.paste(tile, (x * wide, y * high))
     sheet.save(os.path.join(ROOT, "scenes", "pictures", "sweeps.webp"), quality=80, method=6)
     return ["sigma", "relative error", "of adaptive", "p of no bias"], rows
 
@@ -636,13 +650,16 @@ def picture(fits, _):
     from PIL import Image
 
     tile, table = 128, []
-    whole = Image.new("RGB", (tile * 7, tile * len(SHOWN)), "white")
+    high = tile + 20  # of a label
+    whole = Image.new("RGB", (tile * 7, high * len(SHOWN)), "white")
     for y, (truth, shown) in enumerate(SHOWN):
         meshes = [truth] + [fits.path(f, f"step_{step:05}_object.ply") for f, step in shown]
         for x, mesh in enumerate(meshes):
             view = [f"mesh={os.path.abspath(mesh)}", f"format={mesh[-3:]}", f"width={tile}"]
             file = fits.render("eight_views", f"picture/{y}_{x}.exr", view, "--spp 64", 7)
-            whole.paste(Image.open(file[:-3] + "png").convert("RGB"), (tile * x, tile * y))
+            label = f"{shown[x - 1][0].split('_', 1)[1]} {shown[x - 1][1]}" if x else "truth"
+            shape = Image.open(file[:-3] + "png").convert("RGB")
+            whole.paste(labelled(shape, label.replace("_", " "), 11), (tile * x, high * y))
         table.append([os.path.basename(truth), "truth", *(f"{f} {step}" for f, step in shown)])
     whole.save(os.path.join(ROOT, "scenes", "pictures", "fits.webp"), quality=80, method=6)
     return ["row", *([""] * 7)], table

@@ -119,7 +119,7 @@ void check_finite(const Image& image, const std::string& file, const std::string
 }
 
 double srgb_encode(double linear) {
-  return linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
+  return linear <= kSrgbLinear ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
 }
 
 double srgb_decode(double encoded) {

@@ -415,8 +415,10 @@ TEST(Fit, QuasiNewtonRefusesNoise) {
   options.backward.method = "adaptive";
   refuses(options, "take the method analytic");
   options = exact_options();
-  options.loss = LossKind::kL1;
-  refuses(options, "smooth loss");
+  for (const LossKind loss : {LossKind::kL1, LossKind::kL1Srgb, LossKind::kSmape}) {
+    options.loss = loss;
+    refuses(options, "smooth loss");
+  }
   options = exact_options();
   options.spp_doubling = 4;
   refuses(options, "doubling");

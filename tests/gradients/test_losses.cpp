@@ -119,6 +119,59 @@ TEST(Losses, OfAPyramidAreThoseOfItsBlocks) {
   EXPECT_THROW(image_loss(scene, target, {.method = "rays"}, settings, mask), InputError);
 }
 
+// What image_loss() gives with one value of image and target, where images have no noise.
+double loss_of_one(LossKind kind, double image, double target) {
+  const auto encoded = [](double v) {
+    return v <= 0.0031308 ? 12.92 * v : 1.055 * std::pow(v, 1 / 2.4) - 0.055;
+  };
+  const double off = image - target;
+  switch (kind) {
+    case LossKind::kL2: return off * off;
+    case LossKind::kRelativeL2: return off * off / (target * target + 0.01);
+    case LossKind::kL1: return std::fabs(off);
+    case LossKind::kL1Srgb: return std::fabs(encoded(image) - encoded(target));
+    case LossKind::kSmape: return std::fabs(off) / (std::fabs(image) + std::fabs(target) + 0.01);
+  }
+  return NAN;
+}
+
+// Of a sky alone, which every pixel shows without noise; dark, in the line of sRGB's curve, and
+// bright; targets above and below, and below zero.
+TEST(Losses, AreTheirFormulas) {
+  const TempFiles files;
+  SceneParts parts;
+  parts.width = 4;
+  parts.height = 3;
+  parts.body = R"(<emitter type="constant"><rgb name="radiance" value="0.002, 0.3, 2.5"/></emitter>)";
+  const Scene scene = make_scene(files, parts);
+  const double image[] = {0.002, 0.3, 2.5};
+  const double targets[] = {-0.1, 0.001, 0.1, 1, 3};
+  RunSettings settings;
+  settings.spp = 1;
+  for (size_t k = 0; k < std::size(kLosses); ++k) {
+    const auto kind = static_cast<LossKind>(k);
+    for (const double target : targets) {
+      const Image wanted = [&] {
+        Image made(4, 3, 3);
+        for (float& v : made.data) v = static_cast<float>(target);
+        return made;
+      }();
+      const LossResult loss = image_loss(scene, wanted, {kind}, settings);
+      double mean = 0;
+      for (int c = 0; c < 3; ++c) {
+        const double at = static_cast<float>(target), step = 1e-5 * image[c];
+        mean += loss_of_one(kind, image[c], at) / 3;
+        const double slope = (loss_of_one(kind, image[c] + step, at) -
+                              loss_of_one(kind, image[c] - step, at)) /
+                             (2 * step);
+        EXPECT_NEAR(36 * loss.adjoint.data[c], slope, 1e-5 * std::fabs(slope) + 1e-9)
+            << kLosses[k] << " " << target << " " << c;
+      }
+      EXPECT_NEAR(loss.value, mean, 1e-6 * mean) << kLosses[k] << " " << target;
+    }
+  }
+}
+
 TEST(Losses, ImagesThatDoNotFitAreNamed) {
   const TempFiles files;
   const Scene scene = gloss_scene(files);

@@ -484,7 +484,7 @@ TEST_F(Program, CoverageRefusesWhatItCannotTake) {
   ASSERT_EQ(run("render " + scene_ + " --alpha --spp 1 --quiet -o " + target).status, 0);
   EXPECT_NE(refused("backward " + scene_ + " --what alpha --loss relative-l2 --target " + target +
                     " --wrt screen.translate.x -o " + files_.path("back"))
-                .find("relative to coverage"),
+                .find("coverage is not radiance"),
             std::string::npos);
 }
 

@@ -158,19 +158,15 @@ class BackwardCommand final : public Command {
     }
     settings.seconds *= kImageShare;
     const bool alpha = common_.what == "alpha";
-    if (alpha && loss_.kind == LossKind::kRelativeL2) {
-      throw InputError("--what alpha: a loss relative to coverage means little: --loss l2 or l1");
+    if (alpha && !suits_coverage(loss_.kind)) {
+      throw InputError("--what alpha: coverage is not radiance: --loss l2 or l1");
     }
     const Image target = alpha ? read_coverage(target_) : read_image(target_);
     check_loss_images(scene, target, {}, target_);
     loss_.method = loss_method(options_.method);
     loss_.points = options_.points;
     loss = image_loss(scene, target, loss_, settings);
-    if (loss_.kind == LossKind::kL1 && !over_faces()) {
-      warnings_.add_all(
-          {"the gradient of l1 is biased where the image's noise is not small beside "
-           "its difference from the target"});
-    }
+    if (!is_unbiased(loss_.kind) && !over_faces()) warnings_.add_all({bias_warning(loss_.kind)});
     if (loss.spp == 0 || !debug_.empty()) return loss;
     auto attributes = provenance(scene, settings, loss.spp);
     attributes.push_back({"limn.loss", loss_name()});

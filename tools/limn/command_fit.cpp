@@ -203,8 +203,8 @@ FitArguments FitCommand::arguments() const {
     text = with_absolute_field(text, std::min(text.size(), text.rfind('=')));
   }
   a.views = view_arguments();
-  if (!alphas_.empty() && a.options.loss == LossKind::kRelativeL2) {
-    throw InputError("--alpha: a loss relative to coverage means little: --loss l2 or l1");
+  if (!alphas_.empty() && !suits_coverage(a.options.loss)) {
+    throw InputError("--alpha: coverage is not radiance: --loss l2 or l1");
   }
   refuse_samples(*app_, a.options.backward.points, {"--spp"}, a.options);
   if (a.options.optimiser == OptimiserKind::kLbfgs) {

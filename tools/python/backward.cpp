@@ -97,7 +97,7 @@ void bind_loss(nb::module_& m) {
   nb::class_<LossResult>(m, "Loss", "How far the image of a scene is from a target.")
       .def_ro("value", &LossResult::value,
               "A mean over pixels and channels; unbiased, hence below zero now and then near zero, "
-              "but for l1.")
+              "but for l1, l1-srgb and smape.")
       .def_ro("stderr", &LossResult::error, "Its standard error; NaN with spp = 1.")
       .def_ro("spp", &LossResult::spp, "Samples per pixel of each of the two images.")
       .def_prop_ro(

@@ -47,6 +47,7 @@ Image read_image(const std::string& file);
 void check_finite(const StoredImage& image, const std::string& file, const std::string& what);
 void check_finite(const Image& image, const std::string& file, const std::string& what);
 // The transfer function of sRGB, IEC 61966-2-1, and its inverse.
+inline constexpr double kSrgbLinear = 0.0031308;  // up to there sRGB's curve is a line
 double srgb_encode(double linear);
 double srgb_decode(double encoded);
 

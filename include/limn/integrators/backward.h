@@ -116,13 +116,24 @@ std::vector<ReverseCheck> check_reverse(const Scene& scene, const BackwardOption
 enum class LossKind {
   kL2,          // (I - T)^2
   kRelativeL2,  // (I - T)^2 / (T^2 + 0.01): weights from the target alone
-  kL1,  // |I - T|: its adjoint sign(I - T) is biased where the noise of I is not small beside
-        // I - T
+  // Of the images' mean I. They and their adjoints are biased where the noise of I is not small
+  // beside I - T.
+  kL1,      // |I - T|
+  kL1Srgb,  // |e(I) - e(T)|, e: sRGB's transfer function, not clamped
+  kSmape,   // |I - T| / (|I| + |T| + 0.01)
 };
-inline constexpr const char* kLosses[] = {"l2", "relative-l2", "l1"};  // by their numbers
+inline constexpr const char* kLosses[] = {"l2", "relative-l2", "l1", "l1-srgb",
+                                          "smape"};  // by their numbers
+inline bool is_unbiased(LossKind kind) { return kind <= LossKind::kRelativeL2; }
+// Others weigh dark values as eyes or relative errors do.
+inline bool suits_coverage(LossKind kind) {
+  return kind == LossKind::kL2 || kind == LossKind::kL1;
+}
+// The warning about a loss that is biased.
+std::string bias_warning(LossKind kind);
 
 struct LossResult {
-  double value = 0;  // may be negative where the loss is near zero: it is unbiased, but for l1
+  double value = 0;  // l2 and relative-l2, unbiased, may be negative where they are near zero
   double error = 0;  // standard error, from the pixels' own; NaN with fewer than two batches
   Image adjoint;     // dLoss/dI, crop_height by crop_width by 3
   int64_t spp = 0;   // of each of the two images; 0: interrupted before there was one
