@@ -31,12 +31,14 @@ ValueLoss value_loss(LossKind kind, double a, double b, double target) {
   const double distance = std::fabs(off);
   const double sign = off > 0 ? 1.0 : off < 0 ? -1.0 : 0.0;
   switch (kind) {
-    case LossKind::kL2: return {(a - target) * (b - target), 2 * off};
+    case LossKind::kL2:
+      return {(a - target) * (b - target), 2 * off};
     case LossKind::kRelativeL2: {
       const double weight = 1 / (target * target + kDark);
       return {weight * (a - target) * (b - target), 2 * weight * off};
     }
-    case LossKind::kL1: return {distance, sign};
+    case LossKind::kL1:
+      return {distance, sign};
     case LossKind::kL1Srgb:
       return {std::fabs(srgb_encode(image) - srgb_encode(target)), sign * srgb_slope(image)};
     case LossKind::kSmape: {

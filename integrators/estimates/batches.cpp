@@ -474,17 +474,26 @@ size_t steps_to_make(Estimators estimators, RunSettings settings) {
   return std::max<size_t>(1, steps);
 }
 
-// The most times of a batch, since estimators are set up for each. Not tuned.
-constexpr int kMostTimes = 16;
+// How many times a batch has, since estimators are set up for each: one for each sample, unless
+// setting up for all faces (about a tenth of a sample of a pixel for each face of 100,000 that
+// stand still) would take longer than the samples.
+int times_of(Estimators estimators, const Batch& batch) {
+  constexpr int64_t kFaces = 10, kAlways = 16;  // faces for a sample of a pixel; not tuned
+  const Scene& scene = estimators.front()->scene();
+  int64_t faces = 1;
+  for (const Shape& shape : scene.shapes) faces += static_cast<int64_t>(shape.mesh.faces.size());
+  const int64_t samples = batch.count() * static_cast<int64_t>(film_size(scene.film) / 3);
+  return static_cast<int>(
+      std::min<int64_t>(batch.count(), std::max(kAlways, kFaces * samples / faces)));
+}
 
 // The time of a part of a batch, in [0, 1): stratified, in strata as wide as the parts' shares of
 // the samples. If numbers are even in the run and each sample has its own time, times are even in
-// the run instead. Larger batches would skip numbers of the sequence: what is left is not even.
-double draw_time(Estimators estimators, const Batch& batch, const Batch& part) {
-  const bool even =
-      batch.count() <= kMostTimes && std::ranges::any_of(estimators, [](const auto& estimator) {
-        return estimator->numbers() == Numbers::kEvenInRun;
-      });
+// the run instead. Larger parts would skip numbers of the sequence: what is left is not even.
+double draw_time(Estimators estimators, const Batch& batch, const Batch& part, bool own) {
+  const bool even = own && std::ranges::any_of(estimators, [](const auto& estimator) {
+                      return estimator->numbers() == Numbers::kEvenInRun;
+                    });
   constexpr uint64_t kStream = 0x74696d65;  // apart from pixels
   const auto sample = static_cast<uint32_t>(part.first);
   Rng rng = even ? Rng::even(part.seed, kStream, sample) : Rng(part.seed, kStream, sample);
@@ -513,13 +522,13 @@ std::vector<BatchSums> run_batch_at(const EstimatorsAt& at, Estimators estimator
                                     const Batch& batch, int threads, ProgressCounter& progress) {
   if (!at) return run_batch(estimators, batch, threads, progress);
   std::vector<BatchSums> sums;
-  const int times = std::min(batch.count(), kMostTimes);
+  const int times = times_of(estimators, batch);
   const auto begin = [&](int k) {
     return batch.first + static_cast<int>(int64_t{batch.count()} * k / times);
   };
   for (int k = 0; k < times; ++k) {
     const Batch part{batch.seed, begin(k), begin(k + 1)};
-    const EstimatorsAtTime now = at(draw_time(estimators, batch, part));
+    const EstimatorsAtTime now = at(draw_time(estimators, batch, part, times == batch.count()));
     std::vector<BatchSums> more = run_batch(now.list, part, threads, progress);
     if (progress.stopped()) return {};
     for (size_t i = 0; i < sums.size(); ++i) merge(more[i], *estimators[i], sums[i]);

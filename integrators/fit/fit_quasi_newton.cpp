@@ -20,9 +20,9 @@ void Fit::Impl::check_exact() {
         options_.backward.method.name()));
   }
   if (!is_unbiased(options_.loss)) {
-    throw InputError(fmt::format(
-        "the optimiser lbfgs needs a smooth loss: take l2 or relative-l2, not {}",
-        kLosses[static_cast<int>(options_.loss)]));
+    throw InputError(
+        fmt::format("the optimiser lbfgs needs a smooth loss: take l2 or relative-l2, not {}",
+                    kLosses[static_cast<int>(options_.loss)]));
   }
   if (options_.spp_doubling > 0 || options_.step_half_life > 0 || options_.loss_spp > 0) {
     throw InputError(

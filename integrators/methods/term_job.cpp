@@ -143,24 +143,40 @@ class TermJob {
   }
 
  private:
+  size_t pass_count() const { return (parameters_.size() + kLanes - 1) / kLanes; }
+  std::span<const Parameter> parameters_of(size_t p) const {
+    const auto rest = std::span(parameters_).subspan(p * kLanes);
+    return rest.first(std::min<size_t>(kLanes, rest.size()));
+  }
   // time: of the shutter; none: the reference time.
-  std::vector<std::unique_ptr<SampleEstimator>> passes_at(const std::optional<double>& time,
-                                                          int threads) {
+  std::unique_ptr<TermEstimator> pass_at(size_t p, const std::optional<double>& time, int threads) {
     const Warping warping{options_.warp, method_.unbiased};
     TermExtras extras{.warping = method_.warps ? &warping : nullptr,
                       .closed = method_.closed,
                       .moved_film = moves_film_,
                       .time = time};
+    kept_.resize(pass_count());
+    if (time) extras.kept = &kept_[p];
+    return std::make_unique<TermEstimator>(start_ ? *start_ : scene_, parameters_of(p), types_,
+                                           computed_, method_.sampler, threads, extras);
+  }
+  std::vector<std::unique_ptr<SampleEstimator>> passes_at(const std::optional<double>& time,
+                                                          int threads) {
     std::vector<std::unique_ptr<SampleEstimator>> passes;
-    if (time) kept_.resize((parameters_.size() + kLanes - 1) / kLanes);
-    for (size_t k = 0; k < parameters_.size(); k += kLanes) {
-      if (time) extras.kept = &kept_[k / kLanes];
-      const auto some =
-          std::span(parameters_).subspan(k).first(std::min<size_t>(kLanes, parameters_.size() - k));
-      passes.push_back(std::make_unique<TermEstimator>(
-          start_ ? *start_ : scene_, some, types_, computed_, method_.sampler, threads, extras));
-    }
+    for (size_t p = 0; p < pass_count(); ++p) passes.push_back(pass_at(p, time, threads));
     return passes;
+  }
+  // Each sample of a pilot has its own time, as those of the run: what differs between times is
+  // left by any number of samples at one, and is worth no more of them.
+  TermsAt pilots_at(size_t p, const RunSettings& settings) {
+    if (!moving_) return {};
+    constexpr uint64_t kStream = 0x70696c6f;  // any number
+    constexpr double kGolden = 0.6180339887498949;
+    const double first = Rng(settings.seed, kStream, 0).uniform();
+    return [this, p, first, threads = settings.threads](int sample) {
+      const double u = first + kGolden * sample;
+      return pass_at(p, u - std::floor(u), threads);
+    };
   }
   // The rows of terms that can differ from zero, with their samples.
   void keep_changed(const std::vector<std::string>& chosen) {
@@ -246,7 +262,7 @@ class TermJob {
   }
 
   // Plans every pass, by a pilot or as the options say.
-  void plan(const RunSettings& settings, const Stopwatch& watch, GradientResult& result) const {
+  void plan(const RunSettings& settings, const Stopwatch& watch, GradientResult& result) {
     const Stopwatch pilot_watch;
     const bool is_long = settings.seconds > 0 ? watch.seconds() < kSetupShare * settings.seconds
                                               : settings.spp >= kLongRun;
@@ -350,7 +366,7 @@ class TermJob {
     return budget;
   }
 
-  SamplePlan plan_by_pilot(size_t p, const Budget& budget, GradientResult& result) const {
+  SamplePlan plan_by_pilot(size_t p, const Budget& budget, GradientResult& result) {
     TermEstimator& estimator = pass(p);
     const auto& [settings, watch, is_long] = budget;
     SamplePlan plan;
@@ -368,7 +384,8 @@ class TermJob {
     const PilotSize size =
         size_of_pilot(estimator, turns, film ? std::min(spp, kFirstLook) : spp, detail, budget);
     Probed probed;
-    if (size.spp > 0) probed = probe(estimator, turns, size, settings, watch);
+    if (size.spp > 0)
+      probed = probe(estimator, turns, size, settings, watch, pilots_at(p, settings));
     const bool looks =
         film && probed.pilot.spp > 0 &&
         (!budget.timed() || is_time_for_film({probed.pilot.spp, watch.seconds(), settings.seconds},
@@ -471,10 +488,6 @@ class TermJob {
       }
     }
     return fit;
-  }
-
-  std::span<const Parameter> parameters_of(size_t p) const {
-    return std::span(parameters_).subspan(p * kLanes, static_cast<size_t>(pass(p).lanes()));
   }
 
   // Into the mean over parameters, by their variances. figures: before this one's is added.

@@ -460,7 +460,7 @@ void FilmProbe::add_pixels(std::span<const KeyedSample> samples, SampleSink& sin
   for (const KeyedSample& sample : samples) {
     if (looks_at(sample.at)) probes.push_back(sample);
   }
-  terms_.add_pixels(probes, sink);
+  terms_->add_pixels(probes, sink);
 }
 
 bool FilmProbe::looks_at(const PixelSample& at) const {

@@ -66,7 +66,7 @@ class FilmProbe final : public ProbingEstimator {
   FilmProbe(const TermEstimator& terms, const PlanGrid& grid, int turn)
       : ProbingEstimator(terms), grid_(grid), turn_(turn) {}
 
-  int lanes() const override { return terms_.lanes() + 2; }
+  int lanes() const override { return terms_->lanes() + 2; }
   void add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const override;
   bool looks_at(const PixelSample& at) const;
 

@@ -29,12 +29,14 @@ class PilotEstimator final : public ProbingEstimator {
     return static_cast<double>(grid_.size()) / (static_cast<double>(film_size(scene().film)) / 3);
   }
   double film_samples(size_t slot) const override {
-    const bool fewer = fewer_ && !terms_.adds_to_pixels(slot);
-    return terms_.film_samples(slot) * share() * (fewer ? kFewer : 1);
+    const bool fewer = fewer_ && !terms_->adds_to_pixels(slot);
+    return terms_->film_samples(slot) * share() * (fewer ? kFewer : 1);
   }
   // Terms of the film alone have fewer samples: what stratification makes of more is seen.
   static constexpr double kFewer = 0.25;
   void take_fewer(bool fewer) { fewer_ = fewer; }
+  // From now on, with the same slots and parameters.
+  void look_at(const TermEstimator& terms) { terms_ = &terms; }
 
   const PlanGrid& grid() const { return grid_; }
   const std::vector<PairSums>& pairs() const { return pairs_; }
@@ -67,11 +69,11 @@ class PilotEstimator final : public ProbingEstimator {
     if (!grid_.is_probe(scene().film, at.x, at.y)) return;
     const size_t cell = grid_.index(at.x, at.y);
     const bool pair = draws_pairs(cell);
-    const TermEstimator::Sample sample = terms_.sample(at, key, turns_, pair, sink);
+    const TermEstimator::Sample sample = terms_->sample(at, key, turns_, pair, sink);
     if (!sample.finite) return;
     for (size_t slot = 0; slot < slots(); ++slot) {
       if (!sums_[slot].empty()) sums_[slot].add(cell, sample.terms[slot]);
-      if (!terms_.draws_at_vertices(slot)) continue;
+      if (!terms_->draws_at_vertices(slot)) continue;
       listing_[cell * slots() + slot] += sample.listing[slot];
       if (pair) pairs_[slot].add(cell, sample.pair[slot][0], sample.pair[slot][1]);
     }
@@ -101,15 +103,23 @@ class PilotRun {
 
   // Samples [first, last); false if interrupted. Each is a batch of its own: terms of the film are
   // stratified over a batch, where more samples leave less than so many single ones.
-  bool run(const RunSettings& settings, int first, int last, const Stopwatch& watch) {
+  bool run(const RunSettings& settings, int first, int last, const Stopwatch& watch,
+           const TermsAt& at = {}) {
     RunSettings quiet = settings;
     quiet.progress = nullptr;
     ProgressCounter progress(quiet, watch, 1);
     constexpr uint64_t kStream = 0x9110;  // any number
     for (int sample = first; sample < last; ++sample) {
       pilot_.take_fewer(sample % 2 == 1);
+      std::unique_ptr<TermEstimator> there;
+      if (at) {
+        there = at(sample);
+        there->set_plan(terms_.plan());
+        pilot_.look_at(*there);
+      }
       const Batch batch{mix_bits(settings.seed + kStream), sample, sample + 1};
       const auto sums = run_batch(estimators_, batch, settings.threads, progress);
+      pilot_.look_at(terms_);
       if (sums.empty()) return false;
       for (size_t slot = 0; slot < costs_.size(); ++slot) costs_[slot].merge(sums[0].costs[slot]);
       std::vector<Moments>& film = film_[sample % 2];
@@ -153,7 +163,23 @@ class PilotRun {
     return result;
   }
 
-  // See DrawShares; of terms of the film alone.
+  // Where samples have times: the variance of one sample per pixel, and the share of it that any
+  // number of samples at the same times leave. Few samples and fewer have the same of it.
+  std::pair<Lanes, Lanes> film_variance_of_times(size_t slot, double share) const {
+    const Lanes more = film_variance(slot, 1), fewer = film_variance(slot, 1, true);
+    Lanes variance, kept;
+    for (int lane = 0; lane < terms_.lanes(); ++lane) {
+      const double drawn = std::clamp((fewer[lane] - more[lane]) / (1 / PilotEstimator::kFewer - 1),
+                                      0.0, more[lane]);
+      const double of_time = more[lane] - drawn;
+      variance[lane] = of_time + share * drawn;
+      kept[lane] = variance[lane] > 0 ? of_time / variance[lane] : 0;
+    }
+    return {variance, kept};
+  }
+
+  // How the variance of terms of the film alone falls with their samples, where samples have no
+  // times: see DrawShares.
   Lanes film_power(size_t slot) const {
     const Lanes more = film_variance(slot, 1), fewer = film_variance(slot, 1, true);
     Lanes power;
@@ -206,6 +232,7 @@ void PilotFigures::merge(const PilotFigures& more) {
     for (int k = 0; k < kLanes; ++k) {
       mix(film_variance[slot][k], more.film_variance[slot][k]);
       mix(film_power[slot][k], more.film_power[slot][k]);
+      mix(film_kept[slot][k], more.film_kept[slot][k]);
     }
   }
   mix(seconds_of_work, more.seconds_of_work);
@@ -227,14 +254,14 @@ double seconds_of_pixel(const TermEstimator& estimator, bool turns, const RunSet
 }
 
 PilotFigures run_pilot(const TermEstimator& estimator, bool turns, PilotSamples samples,
-                       const RunSettings& settings, const Stopwatch& watch) {
+                       const RunSettings& settings, const Stopwatch& watch, const TermsAt& at) {
   PilotFigures figures;
   auto owned = std::make_unique<PilotEstimator>(estimator, turns, samples.pixels);
   PilotEstimator& pilot = *owned;
   PilotRun run(estimator, std::move(owned));
   const double began = watch.seconds();
   const int first = samples.first;
-  if (!run.run(settings, first, first + 1, watch)) return figures;
+  if (!run.run(settings, first, first + 1, watch, at)) return figures;
   int spp = samples.count();
   if (settings.seconds > 0) {
     const double now = watch.seconds();
@@ -244,9 +271,9 @@ PilotFigures run_pilot(const TermEstimator& estimator, bool turns, PilotSamples 
     if (spp < 4) return figures;
   }
   const int half = spp / 2;
-  if (half > 1 && !run.run(settings, first + 1, first + half, watch)) return figures;
+  if (half > 1 && !run.run(settings, first + 1, first + half, watch, at)) return figures;
   figures.halves[0] = pilot.take_covariances(half);
-  if (!run.run(settings, first + half, first + spp, watch)) return figures;
+  if (!run.run(settings, first + half, first + spp, watch, at)) return figures;
   figures.halves[1] = pilot.take_covariances(half);
   figures.spp = spp;
   figures.grid = pilot.grid();
@@ -256,9 +283,15 @@ PilotFigures run_pilot(const TermEstimator& estimator, bool turns, PilotSamples 
   figures.pairs = pilot.pairs();
   run.add_work(spp, watch.seconds() - began, figures);
   for (size_t slot = 0; slot < estimator.slots(); ++slot) {
-    figures.film_variance.push_back(
-        estimator.film_samples(slot) > 0 ? run.film_variance(slot, share) : Lanes{});
+    const bool on_film = estimator.film_samples(slot) > 0;
+    figures.film_variance.push_back(on_film ? run.film_variance(slot, share) : Lanes{});
+    figures.film_kept.emplace_back();
     figures.film_power.push_back(run.film_power(slot));
+    if (!at || !on_film) continue;
+    const auto [variance, kept] = run.film_variance_of_times(slot, share);
+    figures.film_variance.back() = variance;
+    figures.film_kept.back() = kept;
+    figures.film_power.back() = {1, 1, 1, 1};
   }
   return figures;
 }

@@ -3,6 +3,8 @@
 // for choices about the others. Its random numbers are its own, and its samples are thrown away: a
 // choice that depends on the samples it is made for would bias them.
 #include <array>
+#include <functional>
+#include <memory>
 #include <numeric>
 #include <vector>
 
@@ -27,6 +29,7 @@ struct PilotFigures {
   // channels, of each lane.
   std::vector<Lanes> film_variance;
   std::vector<Lanes> film_power;  // see DrawShares
+  std::vector<Lanes> film_kept;   // the same; 0 where samples have no times
   // Of one sample of a slot, in every cell.
   std::vector<double> variances(size_t slot, int lane) const;
   std::vector<PairSums> pairs;     // of every slot; of none but those at vertices
@@ -41,7 +44,7 @@ struct PilotFigures {
     // Paths of a run are low-discrepancy: they leave so much of what those of a pilot do. Squared
     // error times time is 0.8 to 0.9 of that with 1 (a room whose lamp or whose object moves).
     constexpr double kEven = 0.3;
-    if (!in_cells(slot)) return {0, film_power[slot][lane]};
+    if (!in_cells(slot)) return {film_kept[slot][lane], film_power[slot][lane]};
     const DrawShares shares = pairs[slot].shares(lane);
     return {kEven * shares.kept, shares.power};
   }
@@ -63,10 +66,14 @@ struct PilotSamples {
 double seconds_of_pixel(const TermEstimator& estimator, bool turns, const RunSettings& settings,
                         const Stopwatch& watch);
 
+// What a sample of a pilot is of, where samples have times.
+using TermsAt = std::function<std::unique_ptr<TermEstimator>(int sample)>;
+
 // turns: whether turns of directions at first vertices are looked at. settings: its limit of time
 // is what all pilots and the samples behind them share, which `watch` has timed since they began; a
-// pilot takes what pilot_samples_in_time says, the samples before these included.
+// pilot takes what pilot_samples_in_time says, the samples before these included. at: each sample
+// is of these in place of the estimator, with its plan.
 PilotFigures run_pilot(const TermEstimator& estimator, bool turns, PilotSamples samples,
-                       const RunSettings& settings, const Stopwatch& watch);
+                       const RunSettings& settings, const Stopwatch& watch, const TermsAt& at = {});
 
 }  // namespace limn

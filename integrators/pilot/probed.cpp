@@ -46,8 +46,8 @@ double Probed::error_times_work(int parameters, bool turned) const {
 }
 
 Probed probe(const TermEstimator& estimator, bool turns, const PilotSize& size,
-             const RunSettings& settings, const Stopwatch& watch) {
-  Probed probed{run_pilot(estimator, turns, {0, size.spp, size.pixels}, settings, watch), {}};
+             const RunSettings& settings, const Stopwatch& watch, const TermsAt& at) {
+  Probed probed{run_pilot(estimator, turns, {0, size.spp, size.pixels}, settings, watch, at), {}};
   if (const int reach = estimator.reach(); reach > 0)
     probed.shared = SharedPlace::mean_squares(estimator.scene().film.filter, reach);
   if (turns && probed.pilot.spp > 0)

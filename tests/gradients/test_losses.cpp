@@ -126,11 +126,16 @@ double loss_of_one(LossKind kind, double image, double target) {
   };
   const double off = image - target;
   switch (kind) {
-    case LossKind::kL2: return off * off;
-    case LossKind::kRelativeL2: return off * off / (target * target + 0.01);
-    case LossKind::kL1: return std::fabs(off);
-    case LossKind::kL1Srgb: return std::fabs(encoded(image) - encoded(target));
-    case LossKind::kSmape: return std::fabs(off) / (std::fabs(image) + std::fabs(target) + 0.01);
+    case LossKind::kL2:
+      return off * off;
+    case LossKind::kRelativeL2:
+      return off * off / (target * target + 0.01);
+    case LossKind::kL1:
+      return std::fabs(off);
+    case LossKind::kL1Srgb:
+      return std::fabs(encoded(image) - encoded(target));
+    case LossKind::kSmape:
+      return std::fabs(off) / (std::fabs(image) + std::fabs(target) + 0.01);
   }
   return NAN;
 }
@@ -142,7 +147,8 @@ TEST(Losses, AreTheirFormulas) {
   SceneParts parts;
   parts.width = 4;
   parts.height = 3;
-  parts.body = R"(<emitter type="constant"><rgb name="radiance" value="0.002, 0.3, 2.5"/></emitter>)";
+  parts.body =
+      R"(<emitter type="constant"><rgb name="radiance" value="0.002, 0.3, 2.5"/></emitter>)";
   const Scene scene = make_scene(files, parts);
   const double image[] = {0.002, 0.3, 2.5};
   const double targets[] = {-0.1, 0.001, 0.1, 1, 3};
@@ -161,9 +167,9 @@ TEST(Losses, AreTheirFormulas) {
       for (int c = 0; c < 3; ++c) {
         const double at = static_cast<float>(target), step = 1e-5 * image[c];
         mean += loss_of_one(kind, image[c], at) / 3;
-        const double slope = (loss_of_one(kind, image[c] + step, at) -
-                              loss_of_one(kind, image[c] - step, at)) /
-                             (2 * step);
+        const double slope =
+            (loss_of_one(kind, image[c] + step, at) - loss_of_one(kind, image[c] - step, at)) /
+            (2 * step);
         EXPECT_NEAR(36 * loss.adjoint.data[c], slope, 1e-5 * std::fabs(slope) + 1e-9)
             << kLosses[k] << " " << target << " " << c;
       }

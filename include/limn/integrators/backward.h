@@ -126,9 +126,7 @@ inline constexpr const char* kLosses[] = {"l2", "relative-l2", "l1", "l1-srgb",
                                           "smape"};  // by their numbers
 inline bool is_unbiased(LossKind kind) { return kind <= LossKind::kRelativeL2; }
 // Others weigh dark values as eyes or relative errors do.
-inline bool suits_coverage(LossKind kind) {
-  return kind == LossKind::kL2 || kind == LossKind::kL1;
-}
+inline bool suits_coverage(LossKind kind) { return kind == LossKind::kL2 || kind == LossKind::kL1; }
 // The warning about a loss that is biased.
 std::string bias_warning(LossKind kind);
 
