@@ -205,6 +205,7 @@ def test_an_exception_of_progress_ends_the_run(scene):
 INTERRUPTED = """
     import os, signal, sys, threading, time
     import limn
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # shells' background jobs ignore it
     scene = limn.load(sys.argv[1])
     ticks, sent, stop = [], [], threading.Event()
     def tick():
