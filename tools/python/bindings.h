@@ -81,6 +81,8 @@ using Positions = nb::ndarray<nb::numpy, const float, nb::shape<-1, 3>, nb::c_co
 Image to_image(nb::handle array);
 // H by W by C, the image's memory with it.
 Pixels to_array(Image image);
+// The same, of a type of limn.images that notebooks show.
+nb::object to_picture(Image image, const char* type);
 // A view of a shape's vertices that keeps the scene's state alive.
 Positions view_positions(std::shared_ptr<const Scene> scene, ShapeId shape);
 // Copies of (V, 3) vertices and (F, 3) indices of corners; InputError for other shapes.
