@@ -41,6 +41,18 @@ class Docs(unittest.TestCase):
             page = read(self.folder, "tools", "python", "notebooks", f"{name}.html")
             self.assertGreaterEqual(len(re.findall(r'<img [^>]*src="[^"]*_images/', page)), 2, name)
 
+    def test_photographs_and_bad_starts_are_uses(self):
+        menu = read(self.folder, "history.html").split('class="caption"')
+        (use,) = [part for part in menu if '<span class="caption-text">Use</span>' in part]
+        for page in ("tools/python/RECONSTRUCT", "scenes/regularised/README"):
+            self.assertIn(f"{page}.html", use)
+
+    def test_the_history_has_its_table(self):
+        page = read(self.folder, "history.html")
+        with open(os.path.join(ROOT, "tools", "history.csv"), encoding="utf-8") as stream:
+            rows = len(stream.readlines())
+        self.assertEqual(page.count("<tr "), rows)
+
     def test_every_command_method_and_function_is_named(self):
         program = os.path.join(ROOT, "build", "limn")
         pages = {n: read(self.folder, "reference", f"{n}.html") for n in ("commands", "methods", "python")}
