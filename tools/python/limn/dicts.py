@@ -139,6 +139,9 @@ class Transform:
             product = _step_matrix(tag, attributes) @ product
         return product
 
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> npt.NDArray[Any]:
+        return np.asarray(self.matrix, dtype)
+
     @overload
     def __matmul__(self, first: Transform) -> Transform: ...
 
