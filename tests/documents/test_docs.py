@@ -4,6 +4,7 @@ nothing is fetched from a network, the reference names everything, and pages fit
 windows.
 """
 
+import ast
 import os
 import re
 import subprocess
@@ -11,7 +12,7 @@ import sys
 import tempfile
 import unittest
 from importlib.machinery import SourceFileLoader
-from importlib.util import module_from_spec, spec_from_loader
+from importlib.util import find_spec, module_from_spec, spec_from_loader
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 sys.path.append(os.path.join(ROOT, "tests", "report"))
@@ -67,7 +68,8 @@ class Docs(unittest.TestCase):
                 self.assertEqual(browser.evaluate(MISSING_PICTURES), [])
         self.assertEqual(browser.complaints, [])
 
-    @unittest.skipUnless(find_browser(), "no Chromium: apt-get install chromium")
+    @unittest.skipUnless(find_browser() and find_spec("matplotlib"),
+                         "no Chromium or matplotlib: apt-get install chromium python3-matplotlib")
     def test_the_page_of_the_history_does_too(self):
         sys.path.append(os.path.join(ROOT, "tools"))
         loader = SourceFileLoader("history", os.path.join(ROOT, "tools", "history"))
@@ -121,6 +123,17 @@ class Docs(unittest.TestCase):
             for name in wanted:
                 with self.subTest(page=page, name=name):
                     self.assertRegex(pages[page], rf"[>\b]{name}[<\b]")
+
+    def test_every_type_has_its_parameters(self):
+        page = re.sub(r"<[^>]*>", " ", read(self.folder, "reference", "parameters.html"))
+        types = re.search(r"^TYPES = (\{.*?^\})",
+                          read(ROOT, "tools", "python", "limn", "dicts.py"), re.M | re.S)[1]
+        types = ast.literal_eval(types)
+        self.assertGreater(len(types["bsdf"] + types["emitter"]), 20)
+        for tag in ("bsdf", "emitter"):
+            for name in types[tag]:
+                with self.subTest(tag=tag, type=name):
+                    self.assertRegex(page, rf"{tag} {name}\s")
 
 
 if __name__ == "__main__":
