@@ -10,10 +10,13 @@ import subprocess
 import sys
 import tempfile
 import unittest
+from contextlib import redirect_stdout
 from functools import partial
 from importlib.machinery import SourceFileLoader
 from importlib.util import module_from_spec, spec_from_loader
+from io import StringIO
 from types import SimpleNamespace
+from unittest import mock
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 TOOLS = os.path.join(ROOT, "tools")
@@ -151,6 +154,22 @@ def script(name):
 class History(unittest.TestCase):
     def test_a_commit_that_the_repository_lacks_has_no_subject(self):
         self.assertEqual(script("history").subject_of("123456789abc-dirty"), "")
+
+
+class Pictures(unittest.TestCase):
+    def made(self, *arguments):
+        pictures, names = script("pictures"), []
+        pictures.PARTS = {name: partial(lambda n, _: names.append(n), name) for name in pictures.PARTS}
+        with tempfile.TemporaryDirectory() as pictures.OUT, mock.patch("sys.argv", ["x", *arguments]), \
+                redirect_stdout(StringIO()):
+            pictures.main()
+        return pictures, names
+
+    def test_public_scenes_stay_where_there_is_no_clone(self):
+        pictures, names = self.made("--data", "/nowhere")
+        self.assertEqual(names, [n for n in pictures.PARTS if n not in pictures.PUBLIC])
+        self.assertEqual(self.made("--data", "/nowhere", "--only", "bunny")[1], ["bunny"])
+        self.assertEqual(self.made("--data", "/")[1], list(pictures.PARTS))
 
 
 class Stale(unittest.TestCase):
