@@ -94,7 +94,8 @@ def _joined(meshes: list[Any], linear: bool, others: int) -> tuple[Any, Any, dic
         flipped = np.linalg.det(matrix[:3, :3]) < 0
         faces.append(np.asarray(mesh.faces)[:, ::-1 if flipped else 1] + count)
         count += len(mesh.vertices)
-        if "vertex_normals" in mesh._cache.cache:  # those of the file; else they are made up
+        # Those of the file; trimesh makes up others when asked.
+        if "vertex_normals" in getattr(getattr(mesh, "_cache", None), "cache", ()):
             found["vertex_normals"].append(mesh.vertex_normals @ np.linalg.inv(matrix[:3, :3]))
         if getattr(mesh.visual, "uv", None) is not None:  # whose v grows upwards
             found["vertex_texcoords"].append(mesh.visual.uv * [1, -1] + [0, 1])
