@@ -1,22 +1,43 @@
 #!/usr/bin/env python3
 """tools/docs: the pages are made without a warning, the notebooks run and show their pictures,
-nothing is fetched from a network, and the reference names everything.
+nothing is fetched from a network, the reference names everything, and pages fit wide and narrow
+windows.
 """
 
+import ast
 import os
 import re
 import subprocess
 import sys
 import tempfile
 import unittest
+from importlib.machinery import SourceFileLoader
+from importlib.util import find_spec, module_from_spec, spec_from_loader
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+sys.path.append(os.path.join(ROOT, "tests", "report"))
+from browser import Browser, find_browser  # noqa: E402
+
 NOTEBOOKS = ["first_gradient", "is_it_right", "shape_from_shadow", "relight"]
 
 
 def read(*parts):
     with open(os.path.join(*parts), encoding="utf-8") as stream:
         return stream.read()
+
+
+# Elements that reach out of the window and that nothing scrolls into it.
+CUT = """(() => {
+  const scrolls = e => e && (e.getBoundingClientRect().right <= innerWidth + 1
+      && ['auto', 'scroll'].includes(getComputedStyle(e).overflowX) || scrolls(e.parentElement));
+  return [...document.querySelectorAll('article *')]
+      .filter(e => e.checkVisibility() && e.getBoundingClientRect().right > innerWidth + 1)
+      .filter(e => !scrolls(e)).map(e => e.tagName + ' ' + e.textContent.slice(0, 60));
+})()"""
+SCROLLED_TABLES = """[...document.querySelectorAll('article .table-wrapper')]
+    .filter(e => e.scrollWidth > e.clientWidth + 1).map(e => e.textContent.trim().slice(0, 60))"""
+MISSING_PICTURES = """Promise.all([...document.querySelectorAll('article img')].map(i =>
+    i.decode().then(() => null, () => i.src))).then(all => all.filter(src => src))"""
 
 
 class Docs(unittest.TestCase):
@@ -30,6 +51,41 @@ class Docs(unittest.TestCase):
                 if name.endswith(".html"):
                     yield os.path.join(folder, name)
 
+    @unittest.skipUnless(find_browser(), "no Chromium: apt-get install chromium")
+    def test_pages_fit_wide_and_narrow_windows(self):
+        browser = Browser(find_browser())
+        self.addCleanup(browser.close)
+        for page in self.pages():
+            browser.open(page)
+            for width in (390, 1280):
+                browser.show(width)
+                with self.subTest(page=page, width=width):
+                    shown = browser.evaluate("document.documentElement.scrollWidth")
+                    self.assertLessEqual(shown, width)
+                    self.assertEqual(browser.evaluate(CUT), [])
+            with self.subTest(page=page):
+                self.assertEqual(browser.evaluate(SCROLLED_TABLES), [])
+                self.assertEqual(browser.evaluate(MISSING_PICTURES), [])
+        self.assertEqual(browser.complaints, [])
+
+    @unittest.skipUnless(find_browser() and find_spec("matplotlib"),
+                         "no Chromium or matplotlib: apt-get install chromium python3-matplotlib")
+    def test_the_page_of_the_history_does_too(self):
+        sys.path.append(os.path.join(ROOT, "tools"))
+        loader = SourceFileLoader("history", os.path.join(ROOT, "tools", "history"))
+        history = module_from_spec(spec_from_loader("history", loader))
+        loader.exec_module(history)
+        rows = history.table_rows()
+        browser = Browser(find_browser())
+        self.addCleanup(browser.close)
+        with tempfile.TemporaryDirectory() as history.ROOT:
+            history.write_page(rows, '<svg width="576" height="432"></svg>')
+            browser.open(os.path.join(history.ROOT, "out", "history.html"))
+        for width in (390, 1280):
+            browser.show(width)
+            shown = browser.evaluate("document.documentElement.scrollWidth")
+            self.assertLessEqual(shown, width)
+
     def test_nothing_is_fetched(self):
         for page in self.pages():
             fetched = re.findall(r'<(?:script|img|link|iframe)\b[^>]*(?:src|href)="(https?:[^"]*)"',
@@ -40,6 +96,18 @@ class Docs(unittest.TestCase):
         for name in NOTEBOOKS:
             page = read(self.folder, "tools", "python", "notebooks", f"{name}.html")
             self.assertGreaterEqual(len(re.findall(r'<img [^>]*src="[^"]*_images/', page)), 2, name)
+
+    def test_photographs_and_bad_starts_are_uses(self):
+        menu = read(self.folder, "history.html").split('class="caption"')
+        (use,) = [part for part in menu if '<span class="caption-text">Use</span>' in part]
+        for page in ("tools/python/RECONSTRUCT", "scenes/regularised/README"):
+            self.assertIn(f"{page}.html", use)
+
+    def test_the_history_has_its_table(self):
+        page = read(self.folder, "history.html")
+        with open(os.path.join(ROOT, "tools", "history.csv"), encoding="utf-8") as stream:
+            rows = len(stream.readlines())
+        self.assertEqual(page.count("<tr "), rows)
 
     def test_every_command_method_and_function_is_named(self):
         program = os.path.join(ROOT, "build", "limn")
@@ -55,6 +123,17 @@ class Docs(unittest.TestCase):
             for name in wanted:
                 with self.subTest(page=page, name=name):
                     self.assertRegex(pages[page], rf"[>\b]{name}[<\b]")
+
+    def test_every_type_has_its_parameters(self):
+        page = re.sub(r"<[^>]*>", " ", read(self.folder, "reference", "parameters.html"))
+        types = re.search(r"^TYPES = (\{.*?^\})",
+                          read(ROOT, "tools", "python", "limn", "dicts.py"), re.M | re.S)[1]
+        types = ast.literal_eval(types)
+        self.assertGreater(len(types["bsdf"] + types["emitter"]), 20)
+        for tag in ("bsdf", "emitter"):
+            for name in types[tag]:
+                with self.subTest(tag=tag, type=name):
+                    self.assertRegex(page, rf"{tag} {name}\s")
 
 
 if __name__ == "__main__":

@@ -10,9 +10,13 @@ import subprocess
 import sys
 import tempfile
 import unittest
+from contextlib import redirect_stdout
+from functools import partial
 from importlib.machinery import SourceFileLoader
 from importlib.util import module_from_spec, spec_from_loader
+from io import StringIO
 from types import SimpleNamespace
+from unittest import mock
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 TOOLS = os.path.join(ROOT, "tools")
@@ -88,6 +92,21 @@ class Figures(unittest.TestCase):
             words = [source.choice(ORDER) for _ in values]
             self.assertEqual(repeated.verdicts(of_family(words, values), values), words)
 
+    def test_counts_of_fits(self):
+        page = ("| | | to 1/100 | to 1/1000 | loss left | error | s |\n|---|---|---|---|---|---|---|\n"
+                "| `tree` | `lbfgs`, 5 steps | 3, 2 s | 4, 2 s | 1.4e-13 | 0.000° | 18 |\n"
+                "| | `adam`, 45 | 37, 15 s | 43, 17 s | 9.4e-5 | 0.03° | 18 |\n"
+                "| `gears` | `lbfgs`, 28 | 16, 6 s | 21, 8 s | 6.6e-8 | 0.003° | 13 |\n")
+        history = [{"loss": loss, "evaluations": 1} for loss in (1, 0.1, 0.005, 1e-4, 1e-4)]
+        stored = {"tree": history}.get
+        self.assertEqual(list(repeated.differing_counts(page, stored)), [])
+        history[4]["loss"] = 0.002
+        self.assertEqual(list(repeated.differing_counts(page, stored)), [
+            "tree, lbfgs to 0.001: 4 evaluations are published, none found"])
+        published = repeated.rows(repeated.read(repeated.FITTED))
+        self.assertEqual([row[0] for row in published if len(row) == 7 and row[1].startswith("lbfgs")],
+                         ["tree", "gears", "displacement"])
+
     def test_pages_are_read(self):
         self.assertGreater(repeated.published_seconds(), 0)
         list(repeated.differences())
@@ -137,6 +156,22 @@ class History(unittest.TestCase):
         self.assertEqual(script("history").subject_of("123456789abc-dirty"), "")
 
 
+class Pictures(unittest.TestCase):
+    def made(self, *arguments):
+        pictures, names = script("pictures"), []
+        pictures.PARTS = {name: partial(lambda n, _: names.append(n), name) for name in pictures.PARTS}
+        with tempfile.TemporaryDirectory() as pictures.OUT, mock.patch("sys.argv", ["x", *arguments]), \
+                redirect_stdout(StringIO()):
+            pictures.main()
+        return pictures, names
+
+    def test_public_scenes_stay_where_there_is_no_clone(self):
+        pictures, names = self.made("--data", "/nowhere")
+        self.assertEqual(names, [n for n in pictures.PARTS if n not in pictures.PUBLIC])
+        self.assertEqual(self.made("--data", "/nowhere", "--only", "bunny")[1], ["bunny"])
+        self.assertEqual(self.made("--data", "/")[1], list(pictures.PARTS))
+
+
 class Stale(unittest.TestCase):
     def test_figures_of_an_earlier_build_are_made_again(self):
         release = script("release")
@@ -147,7 +182,7 @@ class Stale(unittest.TestCase):
 
     def test_pages_say_of_which_commit_their_figures_are(self):
         release = script("release")
-        release.FIGURES, release.CODE = ["page.md"], ["code"]
+        release.FIGURES, release.CODE = {"page.md": ["first", "second", "third"]}, ["code"]
         with tempfile.TemporaryDirectory() as release.ROOT:
             def commit(name, text):
                 with open(os.path.join(release.ROOT, name), "w", encoding="utf-8") as stream:
@@ -167,8 +202,60 @@ class Stale(unittest.TestCase):
             second = commit("code", "faster")
             commit("page.md", page + f"Others: commit `{second}`.\nMore: commit `0123456789`.\n")
             self.assertEqual(list(release.stale_figures()), [
-                f"page.md: figures of {first}; 1 commits changed code since",
-                "page.md: figures of 0123456789; ? commits changed code since"])
+                f"page.md: figures of {first}; 1 commits changed code since\n    first",
+                "page.md: figures of 0123456789; ? commits changed code since\n    third"])
+
+    def test_pages_name_a_commit_for_each_command(self):
+        release = script("release")
+        self.assertEqual({page: len(release.commits_of_figures(page)) for page in release.FIGURES},
+                         {page: len(commands) for page, commands in release.FIGURES.items()})
+
+    def test_scripts_of_commands_are_there(self):
+        for commands in script("release").FIGURES.values():
+            for name in re.findall(r"\b(?:tools|scenes)/[\w./]+", " ".join(commands)):
+                if not name.startswith("tools/edge_benchmark"):  # of build
+                    self.assertTrue(os.path.exists(os.path.join(ROOT, name)), name)
+
+    def test_a_rehearsal_publishes_nothing(self):
+        release = script("release")
+        for step in ("history", "wheel", "unchanged", "tag"):
+            self.assertEqual(release.SHORT[step], "")
+        self.assertNotIn("--publish", " ".join(release.SHORT.values()))
+
+    def test_pages_may_be_committed_in_between(self):
+        release = script("release")
+        unchanged = release.STEPS["unchanged"].format().split(" && ")[1]
+        with tempfile.TemporaryDirectory() as release.ROOT:
+            release.OUT = release.ROOT
+            git = partial(release.git, "-c", "user.name=a", "-c", "user.email=a@b")
+
+            def write(name, text):
+                with open(os.path.join(release.ROOT, name), "w", encoding="utf-8") as stream:
+                    stream.write(text)
+
+            def changed():
+                return subprocess.run(["bash", "-c", unchanged], cwd=release.ROOT, check=False,
+                                      capture_output=True).returncode
+
+            git("init", "--quiet")
+            write(".gitignore", "*.log\n*.done\n")
+            write("page.md", "0.5\nFigures: commit `01234567`.\n")
+            write("code.cpp", "fast")
+            git("add", ".")
+            git("commit", "-m", "all")
+            self.assertTrue(release.run("stability", "echo >> ran.log"))
+            write("page.md", "0.5\nFigures: commit `12345678`.\n")
+            self.assertEqual(changed(), 0)
+            write("page.md", "0.6\nFigures: commit `12345678`.\n")
+            self.assertEqual(changed(), 1)
+            git("commit", "-am", "page")
+            self.assertEqual(changed(), 0)
+            for code, times in (("fast", 1), ("faster", 2)):
+                write("code.cpp", code)
+                git("commit", "-am", "code")
+                self.assertTrue(release.run("stability", "echo >> ran.log"))
+                with open(os.path.join(release.ROOT, "ran.log"), encoding="utf-8") as stream:
+                    self.assertEqual(len(stream.readlines()), times)
 
     def test_what_is_published_names_its_commit(self):
         release = script("release")

@@ -242,6 +242,50 @@ def test_jax_gets_what_backward_finds(scene, adjoint):
     assert same(limn.render(scene, spp=2).value, before)
 
 
+STEPS = {"tent.rotate.y": 0.375, "tent.scale": 0.25, "ball.scale": 0.5}  # floats
+
+
+@pytest.fixture
+def stepped(scene):
+    """The scene with these steps, and weights of pixels for which no slope is near 0."""
+    moved = scene.copy()
+    for name in ("tent.scale", "tent.rotate.y", "ball.scale"):
+        moved.move(name, STEPS[name])
+    images = limn.gradient(moved, list(STEPS), spp=64, seed=11).values()
+    return moved, sum(i.value / np.linalg.norm(i.value) for i in images).astype(np.float32)
+
+
+def check_steps(stepped, image, found):
+    """Slopes of (image * weights).sum() are those of derivative images, up to their noise."""
+    moved, weights = stepped
+    assert same(image, limn.render(moved, spp=2, seed=8).value)
+    reverse = limn.backward(moved, weights, list(STEPS), spp=64, seed=9)
+    for name, forward in limn.gradient(moved, list(STEPS), spp=64, seed=10).items():
+        error = np.hypot(reverse[name].stderr, np.linalg.norm(weights * forward.stderr))
+        expected = (weights * forward.value).sum()
+        assert abs(found[name] - expected) < 4 * error < abs(expected), name
+
+
+def test_steps_through_jax_have_the_slopes_of_derivative_images(scene, stepped):
+    jax = pytest.importorskip("jax")
+    import limn.jax as bridge
+
+    def loss(values):
+        image = bridge.render(scene, values, spp=2, spp_grad=64, seed=4)
+        return (image * stepped[1]).sum(), image
+
+    (_, image), found = jax.value_and_grad(loss, has_aux=True)(STEPS)
+    check_steps(stepped, np.asarray(image), found)
+
+
+def test_steps_through_torch_have_the_slopes_of_derivative_images(scene, stepped):
+    torch, bridge = torch_and_bridge()
+    values = {n: torch.tensor(v, dtype=torch.float64, requires_grad=True) for n, v in STEPS.items()}
+    image = bridge.render(scene, values, spp=2, spp_grad=64, seed=4)
+    (image * torch.from_numpy(stepped[1])).sum().backward()
+    check_steps(stepped, image.detach().numpy(), {n: v.grad.item() for n, v in values.items()})
+
+
 # About z by a right angle; then Rodrigues' formula, whose derivative at rest is a cross product.
 def check_pose(pose, derivative):
     p = np.array([[0, 0, 0], [2, 0, 0], [0, 4, 2]], dtype=float)

@@ -209,6 +209,52 @@ def test_trimesh_reads_other_files(tmp_path):
             limn.load_dict({"type": "scene", "box": {"type": "mesh", "filename": name}}, tmp_path)
 
 
+def test_trimesh_keeps_normals_coordinates_and_colours(tmp_path):
+    trimesh = pytest.importorskip("trimesh")
+    ball = trimesh.creation.icosphere(1)
+    turn = limn.Transform().rotate([1, 0, 0], 90).scale([1, 1, 2]).matrix
+    positions, faces = ball.vertices @ turn[:3, :3].T, ball.faces
+    normals = ball.vertices @ np.linalg.inv(turn[:3, :3])
+    uv = np.random.default_rng(3).uniform(0, 1, (len(positions), 2)).astype(np.float32)
+    colours = np.random.default_rng(4).integers(0, 256, (len(positions), 4), np.uint8)
+    texels = np.random.default_rng(5).uniform(0, 1, (4, 4, 3)).astype(np.float32)
+    painted = {"type": "mesh_attribute", "name": "vertex_color"}
+    mapped = {"type": "bitmap", "bitmap": texels, "raw": True}
+
+    def image(texture, **mesh):
+        scene = {**scene_dict(), "ball": {"type": "mesh", **mesh,
+                                          "bsdf": {"type": "diffuse", "reflectance": texture}}}
+        del scene["tent"]  # which would need its file
+        return limn.render(limn.load_dict(scene, str(tmp_path)), spp=2).value
+
+    def export(name, visual):
+        part = trimesh.Trimesh(ball.vertices, faces, vertex_normals=ball.vertices, visual=visual,
+                               process=False)
+        whole = trimesh.Scene()
+        whole.add_geometry(part, transform=turn)
+        whole.export(tmp_path / name, include_normals=True)
+
+    export("painted.glb", trimesh.visual.ColorVisuals(vertex_colors=colours))
+    wanted = image(painted, vertices=positions, faces=faces, vertex_normals=normals,
+                   vertex_color=colours[:, :3] / 255)  # linear in glTF
+    np.testing.assert_allclose(image(painted, filename="painted.glb"), wanted, rtol=1e-3, atol=1e-4)
+    flat = image(painted, vertices=positions, faces=faces, vertex_color=colours[:, :3] / 255)
+    assert abs(flat - wanted).max() > 0.01
+
+    material = trimesh.visual.material.PBRMaterial(baseColorFactor=[255, 0, 0, 255])
+    export("mapped.glb", trimesh.visual.TextureVisuals(uv=uv, material=material))
+    wanted = image(mapped, vertices=positions, faces=faces, vertex_normals=normals,
+                   vertex_texcoords=uv * [1, -1] + [0, 1])
+    with pytest.warns(UserWarning, match="^dict.ball: warning: mapped.glb has materials"):
+        found = image(mapped, filename="mapped.glb")
+    np.testing.assert_allclose(found, wanted, rtol=1e-3, atol=1e-4)
+
+    both = trimesh.Scene([trimesh.creation.box(), trimesh.load(tmp_path / "painted.glb", force="mesh")])
+    both.export(tmp_path / "both.glb")
+    with pytest.warns(UserWarning, match="both.glb has vertex_color of some parts, which limn does not"):
+        image({"type": "rgb", "value": 0.5}, filename="both.glb")
+
+
 def test_mistakes_are_told_together(folder):
     wrong = {"ball": {"type": "sphere", "radius": -1}, "box": {"type": "cube", "size": 2}}
     with pytest.raises(limn.InputError) as error:

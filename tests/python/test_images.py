@@ -39,6 +39,24 @@ def test_notebooks_show_images(scene, tmp_path):
     assert positions["tent.vertex_positions"]._repr_png_() is None
 
 
+def test_notebooks_show_layers_and_what_is_relit(folder, tmp_path):
+    scene = limn.load(folder / "scene.xml")
+    for name, layer in limn.layers(scene, ["normals", "depth", "uv"], spp=2).items():
+        (tmp_path / "a.png").write_bytes(layer._repr_png_())
+        shown = limn.read_image(tmp_path / "a.png")
+        assert (shown.min(), shown.max()) == (0, 1 if np.ptp(layer) else 0), name
+    assert layer[0]._repr_png_() is None and layer.mean() == np.asarray(layer).mean()
+    scene = limn.load_dict({"type": "scene", "floor": {"type": "rectangle"},
+                            "sensor": {"type": "perspective", "film": {"type": "hdrfilm", "width": 8,
+                                                                      "height": 8},
+                                       "to_world": limn.Transform().look_at([0, 0, 3], [0, 0, 0], [0, 1, 0])},
+                            "integrator": {"type": "path", "max_depth": 2},
+                            "sky": {"type": "constant"}})
+    image = limn.bake(scene, spp=2, lines=4).relight(np.full((4, 8, 3), 0.5, np.float32))
+    limn.write_png(tmp_path / "b.png", image)
+    assert image._repr_png_() == (tmp_path / "b.png").read_bytes()
+
+
 def test_estimates_have_what_arrays_have(scene):
     image = limn.render(scene, spp=2)
     assert image.mean() == image.value.mean()

@@ -4,6 +4,7 @@ import ast
 import glob
 import inspect
 import os
+import re
 import subprocess
 import sys
 
@@ -173,3 +174,15 @@ def test_examples_run(file, tmp_path):
     assert done.returncode == 0, done.stdout + done.stderr
     assert "leak" not in done.stderr
     assert list(tmp_path.glob("*.png"))
+
+
+def test_the_ten_lines_run(tmp_path):
+    with open(os.path.join(ROOT, "README.md"), encoding="utf-8") as stream:
+        (lines,) = re.findall(r"^    import limn\n(?:    .*\n)+", stream.read(), re.MULTILINE)
+    os.symlink(os.path.join(ROOT, "tools"), tmp_path / "tools")
+    code = re.sub("^    ", "", lines, flags=re.MULTILINE).replace("spp=64", "spp=4")
+    done = subprocess.run([sys.executable, "-W", "error", "-c", code], cwd=tmp_path,
+                          capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert re.fullmatch(r"\(\d+, 3\) \S+\n", done.stdout)
+    assert (tmp_path / "image.png").exists() and (tmp_path / "change.png").exists()

@@ -154,6 +154,7 @@ def test_check_and_compare_say_what_the_program_says(folder, scene):
     assert check.found == told["smallest_at"] and check.step == told["step"]
     assert check.gradient_sum == told["gradient_sum"] and check.z_sum == told["z_sum"]
     assert check.gradient.value.shape == check.differences.value.shape == (12, 16, 3)
+    assert check.gradient.is_derivative and check.differences.is_derivative
     with pytest.raises(limn.InputError, match="check needs spp of at least 2"):
         limn.check(scene, "tent.translate.y", spp=1)
     with pytest.raises(limn.InputError, match="are for the method was"):
@@ -164,6 +165,7 @@ def test_check_and_compare_say_what_the_program_says(folder, scene):
                               repeats=2, reference_seconds=0.3)
     assert [m.name for m in comparison.methods] == ["adaptive", "fd"]
     assert comparison.reference.value.shape == (12, 16, 3) and comparison.reference.spp > 1
+    assert comparison.reference.is_derivative
     for method in comparison.methods:
         assert len(method.budgets) == 2 and method.budgets[1].mse[1] > 0 and method.message == ""
         assert method.image.shape == (12, 16, 3)

@@ -81,7 +81,7 @@ def test_text_is_as_good_as_a_file(folder, scene):
      "[2.22507e-308, 180]"),
     (lambda s, f: s.__setitem__("tent.rotate.x", 1),
      '{f}/scene.xml: error: parameter "tent.rotate.x" moves things from where they are and has no '
-     'value to set: scene.move("tent.rotate.x", step)'),
+     'value to set: scene.move("tent.rotate.x", step), or scene["tent.to_world"]'),
     (lambda s, f: s.__setitem__("tent.vertex_positions", np.zeros((5, 3))),
      '{f}/scene.xml: error: parameter "tent.vertex_positions" has shape (6, 3), not (5, 3)'),
     (lambda s, f: s.__setitem__("tent.vertex_positions", np.full((6, 3), np.inf)),

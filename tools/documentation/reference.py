@@ -5,6 +5,7 @@ import glob
 import os
 import re
 import subprocess
+import tempfile
 import xml.etree.ElementTree as ElementTree
 from collections import defaultdict
 
@@ -82,28 +83,78 @@ def methods_page():
     return re.sub(r"\n## [^\n]*\n\n[^\n]*\n\n\| setting \| meaning \|\n\|---\|---\|(?!\n\|)", "", text)
 
 
+MAP = '<texture name="NAME" type="bitmap"><string name="filename" value="map.hdr"/>' \
+      '<boolean name="raw" value="true"/></texture>'
+NESTED = '<bsdf type="diffuse" id="nested_ID"/>'
+# What types need inside.
+INSIDE = {
+    "bsdf": {"blendbsdf": '<float name="weight" value="0.5"/>' + NESTED + NESTED.replace("_", "_2_"),
+             "bumpmap": MAP + NESTED, "mask": '<float name="opacity" value="0.5"/>' + NESTED,
+             "normalmap": MAP.replace("NAME", "normalmap") + NESTED, "twosided": NESTED},
+    "emitter": {"envmap": '<string name="filename" value="map.hdr"/>',
+                "projector": MAP.replace("NAME", "irradiance")},
+}
+
+
+def types(tag):
+    """All that the reader knows (tests hold load_dict's list to it)."""
+    with open(os.path.join(MODULE, "dicts.py"), encoding="utf-8") as stream:
+        text = re.search(r"^TYPES = (\{.*?^\})", stream.read(), re.MULTILINE | re.DOTALL)[1]
+    return ast.literal_eval(text)[tag]
+
+
+def example(folder):
+    """A scene with one of each BSDF and emitter that has its type for its id; its file. Of the
+    environments it has one: scenes here have the constant one."""
+
+    def element(tag, name):
+        inside = INSIDE[tag].get(name, "").replace("ID", name).replace(' name="NAME"', "")
+        return f'<{tag} type="{name}" id="{name}">{inside}</{tag}>'
+
+    on_shapes = [element("bsdf", name) for name in types("bsdf")] + [element("emitter", "area")]
+    free = [element("emitter", name) for name in types("emitter") if name not in ("area", "constant")]
+    lines = ['<scene version="3.0.0">', '<sensor type="perspective"/>', *free,
+             *(f'<shape type="rectangle">{inside}</shape>' for inside in on_shapes), "</scene>"]
+    with open(os.path.join(folder, "map.hdr"), "wb") as stream:  # 2 x 4 grey pixels
+        stream.write(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 4 +X 2\n" + bytes([128, 128, 128, 128]) * 8)
+    file = os.path.join(folder, "example.xml")
+    with open(file, "w", encoding="utf-8") as stream:
+        stream.write("\n".join(lines))
+    return file
+
+
+def add_parameters(file, found):
+    """Those that `limn info` lists of a scene, by kind of object; found[kind][name] is the unit."""
+    try:
+        listed = limn("info", file)
+    except subprocess.CalledProcessError:
+        return  # a part that others include
+    kinds = {"sensor": "sensor"}
+    for element in ElementTree.parse(file).iter():
+        if element.get("id") and element.get("type"):
+            kinds[element.get("id")] = f"{element.tag} {element.get('type')}"
+    for name, unit in re.findall(r"^  (\S+)  \[(.*?)\]", listed, re.MULTILINE):
+        thing, _, rest = name.partition(".")
+        kind = kinds.get(thing, "").replace("sensor perspective", "sensor")
+        if kind.startswith("shape"):
+            kind = "shape"
+        if kind:
+            found[kind].setdefault(re.sub(r"\.[xyz]$", ".x", rest), unit)
+
+
 def parameters_page():
-    """What `limn info` lists of all scenes here, by the kind of object that has it."""
+    """What `limn info` lists of all scenes here and of one with all types."""
     found = defaultdict(dict)
     for file in sorted(glob.glob(os.path.join(ROOT, "scenes", "**", "*.xml"), recursive=True)):
-        try:
-            listed = limn("info", file)
-        except subprocess.CalledProcessError:
-            continue  # a part that others include
-        kinds = {"sensor": "sensor"}
-        for element in ElementTree.parse(file).iter():
-            if element.get("id") and element.get("type"):
-                kinds[element.get("id")] = f"{element.tag} {element.get('type')}"
-        for name, unit in re.findall(r"^  (\S+)  \[(.*?)\]", listed, re.MULTILINE):
-            thing, _, rest = name.partition(".")
-            kind = kinds.get(thing, "").replace("sensor perspective", "sensor")
-            if kind.startswith("shape"):
-                kind = "shape"
-            if kind:
-                found[kind].setdefault(re.sub(r"\.[xyz]$", ".x", rest), unit)
+        add_parameters(file, found)
+    with tempfile.TemporaryDirectory(prefix="limn_reference_") as folder:
+        add_parameters(example(folder), found)
     lines = ["# Parameters\n",
              "`ID.NAME`, for `--wrt` and `scene[...]`; `limn info SCENE` lists those of a scene. "
-             "This table is of the scenes in `scenes/`. Where `.x` stands, `.y` and `.z` exist.\n",
+             "Where `.x` stands, `.y` and `.z` exist. Where a texture gives a colour or number, "
+             "`NAME.data` (`bitmap`), `NAME.color0` and `NAME.color1` (`checkerboard`), or "
+             "`SHAPE.ATTRIBUTE` (`mesh_attribute`) stand for it. Materials around another one have "
+             "that one's, too.\n",
              "| object | parameter | unit |", "|---|---|---|"]
     for kind in sorted(found):
         for unit in sorted(set(found[kind].values())):

@@ -1,17 +1,25 @@
 """Published figures that repeated ones contradict: the first table of scenes/COMPARISONS.md beside
-results of `tools/paper --ablations`, the table of scenes/STABILITY.md beside `tools/stability`.
+results of `tools/paper --ablations`, the table of scenes/STABILITY.md beside `tools/stability`, and
+counts of scenes/fits/README.md, which have no noise, beside `scenes/fits/fits.py`.
 """
 
 import math
 import os
 import re
+import sys
 
-from common import ROOT
+from common import ROOT, read_json
 from paper_figures import ablations
 from stability_suite import table
 from stability_suite.verdicts import BIASED, FAILS, LATE, REFUSES, RIGHT, number
 
-COMPARISONS, STABILITY = (os.path.join("scenes", name) for name in ("COMPARISONS.md", "STABILITY.md"))
+sys.path.append(os.path.join(ROOT, "scenes", "fits"))
+import fits  # noqa: E402
+
+COMPARISONS, STABILITY, FITTED = (
+    os.path.join("scenes", name)
+    for name in ("COMPARISONS.md", "STABILITY.md", os.path.join("fits", "README.md")))
+FITS = os.path.join(ROOT, "out", "release", "fits")  # of a rehearsal
 # Of the first table.
 METHODS = {"light sets": "silhouettes", "+ directions": "silhouettes:directions=moving",
            "+ placement": "adaptive:film=fixed:generator=independent", "adaptive": "adaptive",
@@ -89,11 +97,30 @@ def differing_verdicts(page, stored):
                            f"{now} found")
 
 
+def differing_counts(page, history_of):
+    """A line for each count of evaluations to 1/100 and 1/1000 that a stored fit by L-BFGS lacks.
+    history_of(name): of the fit, or None."""
+    for name, how, *cells in (row for row in rows(page) if len(row) == 7):
+        history = history_of(name) if how.startswith("lbfgs, ") else None
+        for cell, part in zip(cells, (0.01, 0.001) if history else ()):
+            then = int(cell.split(",")[0])
+            now = fits.reached({"history": history, "seconds": 0}, part)
+            if not now or then != now[0]:
+                yield (f"{name}, lbfgs to {part:g}: {then} evaluations are published, "
+                       f"{now[0] if now else 'none'} found")
+
+
+def stored_history(name):
+    fit = read_json(os.path.join(FITS, f"{name}_lbfgs", "fit.json"))
+    return fit and fit["history"]
+
+
 def differences():
-    """A line for each published figure that what lies in out/paper and out/stability contradicts."""
+    """A line for each published figure that what lies in out/ contradicts."""
     out = os.path.join(ROOT, "out")
     times = ablations.stored(lambda part: os.path.join(out, "paper", part.name))
     for page, lines in ((COMPARISONS, differing_times(read(COMPARISONS), times)),
                         (STABILITY, differing_verdicts(read(STABILITY),
-                                                       table.stored(os.path.join(out, "stability"))))):
+                                                       table.stored(os.path.join(out, "stability")))),
+                        (FITTED, differing_counts(read(FITTED), stored_history))):
         yield from (f"{page}: {line}" for line in lines)

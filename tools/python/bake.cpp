@@ -68,7 +68,7 @@ void bind_bake(nb::module_& m) {
           [](const BakedView& view, nb::handle sky, double scale, double rotate, int threads) {
             const SkyMap map = to_map(sky, scale, rotate);
             const int count = checked_threads(threads);
-            return to_array(without_gil([&] { return view.relight(map, count); }));
+            return to_picture(without_gil([&] { return view.relight(map, count); }), "Picture");
           },
           nb::arg("sky"), nb::arg("scale") = 1.0, nb::arg("rotate") = 0.0, nb::arg("threads") = 0,
           nb::sig("def relight(self, sky: numpy.typing.ArrayLike, scale: float = 1.0, rotate: "

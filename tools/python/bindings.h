@@ -1,6 +1,6 @@
 #pragma once
-// What the groups of bindings share. This folder is the one door to nanobind; it holds no logic:
-// all is computed by limn/...
+// What the groups of bindings share. This folder is the one door to nanobind; it holds no logic
+// but that of places (to_world.h): all else is computed by limn/...
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/function.h>
@@ -25,6 +25,7 @@
 #include "limn/integrators/moments.h"
 #include "limn/integrators/parts.h"
 #include "limn/integrators/run.h"
+#include "tools/python/to_world.h"
 
 namespace limn::python {
 
@@ -34,7 +35,8 @@ namespace nb = nanobind;
 // change while others hold that state is made to a copy. Used with the GIL held.
 class SceneHandle {
  public:
-  explicit SceneHandle(Scene scene) : scene_(std::make_shared<Scene>(std::move(scene))) {}
+  explicit SceneHandle(Scene scene)
+      : history(scene), scene_(std::make_shared<Scene>(std::move(scene))) {}
   const Scene& get() const { return *scene_; }
   std::shared_ptr<const Scene> share() const { return scene_; }
   Scene& edit() {
@@ -42,8 +44,7 @@ class SceneHandle {
     return *scene_;
   }
 
-  // How far translations have moved since the scene was read [scene units], by name.
-  std::map<std::string, double> moved;
+  History history;
 
  private:
   std::shared_ptr<Scene> scene_;
@@ -81,6 +82,11 @@ using Positions = nb::ndarray<nb::numpy, const float, nb::shape<-1, 3>, nb::c_co
 Image to_image(nb::handle array);
 // H by W by C, the image's memory with it.
 Pixels to_array(Image image);
+// The same, of a type of limn.images that notebooks show.
+nb::object to_picture(Image image, const char* type);
+// (4, 4) of float64, and back; InputError, which says what it is, for another shape.
+nb::object to_array(const Matrix4& matrix);
+Matrix4 to_matrix(nb::handle array, const std::string& what);
 // A view of a shape's vertices that keeps the scene's state alive.
 Positions view_positions(std::shared_ptr<const Scene> scene, ShapeId shape);
 // Copies of (V, 3) vertices and (F, 3) indices of corners; InputError for other shapes.

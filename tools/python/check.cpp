@@ -28,8 +28,10 @@ Check check_of(const SceneHandle& handle, const CheckOptions& options, const Run
   check.gradient = to_estimate(r.gradient.parameters.at(0).total, scene->film, r.gradient.spp,
                                r.gradient.seconds);
   check.gradient.warnings = r.gradient.warnings;
+  check.gradient.is_derivative = true;
   check.differences = to_estimate(r.differences.extrapolated.total, scene->film, r.differences.spp,
                                   r.differences.seconds);
+  check.differences.is_derivative = true;
   NonFinite bad = r.gradient.non_finite;
   bad.merge(r.differences.non_finite);
   warn_all(r.gradient.warnings);
@@ -54,6 +56,7 @@ ExactCheck check_exactly(const SceneHandle& handle, const CheckOptions& options,
   check.gradient =
       to_estimate(gradient.parameters.at(0).total, scene->film, gradient.spp, gradient.seconds);
   check.gradient.warnings = gradient.warnings;
+  check.gradient.is_derivative = true;
   warn_all(gradient.warnings);
   check_finite(check.result.non_finite, nb::cast(check));
   return check;

@@ -36,7 +36,8 @@ Estimate to_estimate(const Reference& reference, int width, int height) {
           Array(to_pixels(errors, width, height)),
           reference.spp,
           reference.seconds,
-          {}};
+          {},
+          true};
 }
 
 struct CompareCall : RunCall {

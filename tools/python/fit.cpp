@@ -21,7 +21,7 @@ constexpr const char* kTargetType =
 struct FitHandle {
   Fit fit;
   std::vector<FitRecord> history;
-  std::vector<std::map<std::string, double>> moved;  // SceneHandle's, of each view at the start
+  std::vector<History> histories;  // SceneHandle's, of each view at the start
   bool busy = false;  // with a step, which lets others have the GIL; used with the GIL held
 
   // InputError during a step.
@@ -104,9 +104,9 @@ struct FitCall {
   }
 
   // SceneHandle's, of each view.
-  std::vector<std::map<std::string, double>> moved() const {
-    std::vector<std::map<std::string, double>> all{scene->moved};
-    for (nb::handle view : views) all.push_back(nb::cast<const SceneHandle&>(view[0]).moved);
+  std::vector<History> histories() const {
+    std::vector<History> all{scene->history};
+    for (nb::handle view : views) all.push_back(nb::cast<const SceneHandle&>(view[0]).history);
     return all;
   }
 
@@ -152,9 +152,9 @@ nb::list scenes_of(const FitHandle& h) {
   nb::list scenes;
   for (size_t i = 0; i < h.fit.views().size(); ++i) {
     SceneHandle scene(deep_copy(h.fit.views()[i].scene));
-    scene.moved = h.moved[i];
+    scene.history = h.histories[i];
     for (const FitScalar& s : h.fit.scalars()) {
-      if (is_translation(s.parameter)) scene.moved[s.parameter] += s.value;
+      if (is_translation(s.parameter)) scene.history.moved[s.parameter] += s.value;
     }
     scenes.append(nb::cast(std::move(scene)));
   }
@@ -255,7 +255,7 @@ void bind_fit(nb::module_& m) {
             call.take(given);
             given.read(positional, named);
             Fit fit = call.make(given);
-            new (self) FitHandle{std::move(fit), {}, call.moved(), false};
+            new (self) FitHandle{std::move(fit), {}, call.histories(), false};
           },
           nb::sig(arguments.method_signature("__init__", "None").c_str()),
           ("Copies the scene; it stays as it is.\n\n" + arguments.documentation()).c_str())

@@ -23,19 +23,10 @@ nb::ndarray<nb::numpy, T, nb::c_contig> owned(std::vector<T> values,
   return nb::ndarray<nb::numpy, T, nb::c_contig>(kept->data(), shape, owner);
 }
 
-Vectors get_pose(const SceneHandle& scene) {
-  const Matrix4 pose = camera_to_world(scene.get());
-  return owned<double>({&pose.m[0][0], &pose.m[0][0] + 16}, {4, 4});
-}
+nb::object get_pose(const SceneHandle& scene) { return to_array(camera_to_world(scene.get())); }
 
 void set_pose(SceneHandle& scene, nb::handle value) {
-  const Doubles rows = doubles(value);
-  if (rows.ndim() != 2 || rows.shape(0) != 4 || rows.shape(1) != 4) {
-    throw InputError("sensor_to_world has shape (4, 4)");
-  }
-  Matrix4 pose;
-  std::copy(rows.data(), rows.data() + 16, &pose.m[0][0]);
-  const Camera camera = place_camera(scene.get(), pose);
+  const Camera camera = place_camera(scene.get(), to_matrix(value, "sensor_to_world"));
   scene.edit().camera = camera;
 }
 
@@ -84,9 +75,24 @@ nb::dict intersect(const SceneHandle& scene, nb::handle origins, nb::handle dire
 
 }  // namespace
 
+nb::object to_array(const Matrix4& matrix) {
+  return nb::cast(owned<double>({&matrix.m[0][0], &matrix.m[0][0] + 16}, {4, 4}),
+                  nb::rv_policy::move);
+}
+
+Matrix4 to_matrix(nb::handle array, const std::string& what) {
+  const Doubles rows = doubles(array);
+  if (rows.ndim() != 2 || rows.shape(0) != 4 || rows.shape(1) != 4) {
+    throw InputError(what + " has shape (4, 4)");
+  }
+  Matrix4 matrix;
+  std::copy(rows.data(), rows.data() + 16, &matrix.m[0][0]);
+  return matrix;
+}
+
 void bind_geometry(nb::class_<SceneHandle>& scene) {
   scene
-      .def_prop_rw("sensor_to_world", get_pose, set_pose, nb::for_getter(nb::rv_policy::move),
+      .def_prop_rw("sensor_to_world", get_pose, set_pose,
                    nb::for_getter(nb::sig("def sensor_to_world(self) -> numpy.ndarray")),
                    nb::for_setter(nb::sig("def sensor_to_world(self, value: "
                                           "numpy.typing.ArrayLike, /) -> None")),

@@ -43,6 +43,11 @@ Pixels to_array(Image image) {
   return Pixels(owned->data.data(), 3, shape, owner);
 }
 
+nb::object to_picture(Image image, const char* type) {
+  const nb::object shown = nb::module_::import_("limn.images").attr(type);
+  return nb::cast(to_array(std::move(image))).attr("view")(shown);
+}
+
 namespace {
 
 // A file's path that ends in `ending`; InputError for another one.

@@ -27,8 +27,8 @@ ParameterView find(const SceneHandle& scene, const std::string& name) {
   ParameterView view{scene.share(), find_parameter_or_array(scene.get(), name), std::nullopt};
   if (!is_translation(view.parameter.name)) return view;
   if (!view.parameter.value(*view.scene).empty()) return view;  // a place, as the camera's
-  const auto moved = scene.moved.find(view.parameter.name);
-  view.moved = moved == scene.moved.end() ? 0 : moved->second;
+  const auto moved = scene.history.moved.find(view.parameter.name);
+  view.moved = moved == scene.history.moved.end() ? 0 : moved->second;
   return view;
 }
 
@@ -69,7 +69,26 @@ void check_shape(const ParameterView& view, const nb::ndarray<const double, nb::
                                shape_text(shape), shape_text(given)));
 }
 
+// SHAPE of SHAPE.scale and SHAPE.rotate.x.
+std::string object_of(const std::string& name) {
+  const std::string whole = name.substr(0, name.rfind('.'));
+  return name.ends_with(".scale") ? whole : whole.substr(0, whole.rfind('.'));
+}
+
+nb::object get(const SceneHandle& scene, const std::string& name) {
+  if (!names_place(scene.get(), name)) return value_of(find(scene, name));
+  return to_array(to_world(scene.get(), scene.history, name));
+}
+
+void set_place(SceneHandle& scene, const std::string& name, nb::handle value) {
+  const Matrix4 matrix = to_matrix(value, name);
+  std::vector<std::string> warnings;
+  place(scene.edit(), scene.history, name, matrix, &warnings);
+  warn_all(warnings);
+}
+
 void assign(SceneHandle& scene, const std::string& name, nb::handle value) {
+  if (names_place(scene.get(), name)) return set_place(scene, name, value);
   const auto array = nb::cast<nb::ndarray<const double, nb::c_contig, nb::device::cpu>>(
       as_array(value, "float64"));
   std::vector<double> numbers(array.data(), array.data() + array.size());
@@ -87,14 +106,15 @@ void assign(SceneHandle& scene, const std::string& name, nb::handle value) {
                                                        parameter.name, numbers.size()));
     }
     parameter.move_checked(scene.edit(), numbers[0] - *moved);
-    scene.moved[parameter.name] = numbers[0];
+    scene.history.moved[parameter.name] = numbers[0];
     return;
   }
   if (parameter.array.empty() && parameter.value(scene.get()).empty()) {
-    throw InputError({scene.get().file},
-                     fmt::format("parameter \"{0}\" moves things from where they are and has no "
-                                 "value to set: scene.move(\"{0}\", step)",
-                                 parameter.name));
+    throw InputError(
+        {scene.get().file},
+        fmt::format("parameter \"{0}\" moves things from where they are and has no "
+                    "value to set: scene.move(\"{0}\", step), or scene[\"{1}.to_world\"]",
+                    parameter.name, object_of(parameter.name)));
   }
   std::vector<std::string> warnings;
   parameter.assign(scene.edit(), numbers, &warnings);
@@ -206,15 +226,19 @@ void bind_parameters(nb::module_& m, nb::class_<SceneHandle>& scene) {
           "(\"object.vertex_positions.7.x\", \"clay.reflectance.r\", \"sky.data.0.5.g\") are "
           "found, too, but not "
           "listed.")
+      .def("__getitem__", get, nb::arg("name"),
+           nb::sig("def __getitem__(self, name: str) -> float | numpy.ndarray | None"),
+           "The value of a parameter, see limn.Parameter.value. \"ID.to_world\" of shapes, delta "
+           "lights and environment maps: (4, 4), float64, from where the file has them to where "
+           "they are; \"sensor.to_world\" is sensor_to_world.")
       .def(
-          "__getitem__",
-          [](const SceneHandle& s, const std::string& name) { return value_of(find(s, name)); },
-          nb::arg("name"),
-          nb::sig("def __getitem__(self, name: str) -> float | numpy.ndarray | None"),
-          "The value of a parameter, see limn.Parameter.value.")
-      .def("__contains__", has, nb::arg("name"),
-           nb::sig("def __contains__(self, name: object) -> bool"),
-           "Is there a parameter of this name?")
+          "__contains__",
+          [](const SceneHandle& s, nb::handle name) {
+            return has(s, name) || (nb::isinstance<nb::str>(name) &&
+                                    names_place(s.get(), nb::cast<std::string>(name)));
+          },
+          nb::arg("name"), nb::sig("def __contains__(self, name: object) -> bool"),
+          "Has scene[name] a value?")
       .def(
           "__iter__",
           [](SceneHandle& s) { return nb::iter(nb::cast(names_of(ParametersView{&s}))); },
@@ -223,7 +247,10 @@ void bind_parameters(nb::module_& m, nb::class_<SceneHandle>& scene) {
       .def("__setitem__", assign, nb::arg("name"), nb::arg("value"),
            nb::sig("def __setitem__(self, name: str, value: numpy.typing.ArrayLike) -> None"),
            "Sets the value of a parameter: checked, copied; views that were taken stay as they "
-           "are.");
+           "are. \"ID.to_world\": a matrix or limn.Transform that places the object from where the "
+           "file has it, as T @ scene[\"ID.to_world\"] does. It must not mirror, nor scale lights "
+           "but points; environment maps turn about y. limn.InputError for shapes that move "
+           "while a shutter is open.");
 }
 
 }  // namespace limn::python

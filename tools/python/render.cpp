@@ -66,7 +66,7 @@ struct LayersCall : RunCall {
     });
     nb::dict layers;
     for (ImageLayer& layer : result.layers) {
-      layers[nb::cast(layer.name)] = nb::cast(to_array(std::move(layer.image)));
+      layers[nb::cast(layer.name)] = to_picture(std::move(layer.image), "Layer");
     }
     check_finite(result.non_finite, layers);
     return layers;

@@ -193,7 +193,7 @@ void bind_changes(nb::class_<SceneHandle>& scene) {
           [](SceneHandle& s, const std::string& name, double step) {
             const Parameter parameter = find_parameter(s.get(), name);
             parameter.move_checked(s.edit(), step);
-            if (is_translation(parameter.name)) s.moved[parameter.name] += step;
+            if (is_translation(parameter.name)) s.history.moved[parameter.name] += step;
           },
           nb::arg("name"), nb::arg("step"),
           "Moves a parameter by `step`, in its unit, from where it is; exact for large steps.\n\n"

@@ -139,6 +139,9 @@ class Transform:
             product = _step_matrix(tag, attributes) @ product
         return product
 
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> npt.NDArray[Any]:
+        return np.asarray(self.matrix, dtype)
+
     @overload
     def __matmul__(self, first: Transform) -> Transform: ...
 
@@ -267,7 +270,11 @@ class _Writer:
             if file is None:
                 write_ply(path, what["vertices"], what["faces"], **{k: what[k] for k in own})
             else:
-                write_ply(path, *read_foreign(os.path.join(self.folder, file)))
+                points, faces, found, dropped = read_foreign(os.path.join(self.folder, file))
+                write_ply(path, points, faces, **found)
+                if dropped:
+                    warnings.warn(f"{place}: warning: {file} has {', '.join(dropped)}, which limn "
+                                  "does not take", stacklevel=2)
         except (TypeError, ValueError) as error:
             raise InputError(f"{place}: error: {error}") from None
         return {**rest, "type": "ply", "filename": path}
@@ -347,7 +354,8 @@ def load_dict(scene: Mapping[str, Any], folder: str = "") -> Scene:
     ("ball.bsdf.reflectance"), unless they say "id". {"type": "ref", "id": ...} names one that stands
     before. {"type": "mesh", "vertices": (V, 3), "faces": (F, 3)} is a shape of arrays, with the
     attributes of write_ply ("vertex_color", ...); with a "filename" in their place it is one of a
-    file, of STL, glTF and other formats if trimesh is installed. Files are looked for in `folder`.
+    file, of STL, glTF and other formats if trimesh is installed, with their normals, texture
+    coordinates and colours of vertices. Files are looked for in `folder`.
     Raises limn.InputError with the place: dict.ball.bsdf.
     """
     if not isinstance(scene, Mapping) or scene.get("type") != "scene":

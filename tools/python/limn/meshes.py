@@ -58,8 +58,9 @@ def write_ply(
             os.remove(unfinished)
 
 
-def read_foreign(file: str) -> tuple[Any, Any]:
-    """Positions and faces of a file that trimesh reads (STL, glTF, OFF, ...)."""
+def read_foreign(file: str) -> tuple[Any, Any, dict[str, Any], list[str]]:
+    """Of a file that trimesh reads (STL, glTF, OFF, ...): positions, faces, attributes as write_ply
+    takes them, and in words what the file has besides."""
     try:
         import trimesh
     except ImportError:
@@ -67,10 +68,45 @@ def read_foreign(file: str) -> tuple[Any, Any]:
     if not os.path.isfile(file):
         raise InputError(f'no such file: "{file}"')
     try:
-        mesh: Any = trimesh.load(file, force="mesh", process=False)
+        loaded: Any = trimesh.load(file, process=False)
+        parts: list[Any] = [(np.eye(4), loaded)]
+        if isinstance(loaded, trimesh.Scene):
+            placed = [loaded.graph[node] for node in loaded.graph.nodes_geometry]
+            parts = [(matrix, loaded.geometry[name]) for matrix, name in placed]
+        meshes = [(m, g) for m, g in parts if isinstance(g, trimesh.Trimesh) and len(g.faces)]
+        if not meshes:
+            raise ValueError("no triangles are in it")
+        linear = file.lower().endswith((".gltf", ".glb"))
+        return _joined(meshes, linear, others=len(parts) - len(meshes))
     except Exception as error:  # of many kinds, one or more for each format
         raise InputError(f"trimesh cannot read {file}: {error}") from None
-    return mesh.vertices, mesh.faces
+
+
+def _joined(meshes: list[Any], linear: bool, others: int) -> tuple[Any, Any, dict[str, Any], list[str]]:
+    """One mesh of all, each with its matrix. Attributes that only some have are dropped."""
+    from .photo_output import from_srgb  # which needs this module
+
+    positions, faces, count = [], [], 0
+    found: dict[str, list[Any]] = {name: [] for name in _PROPERTIES if name.startswith("vertex_")}
+    materials = False
+    for matrix, mesh in meshes:
+        positions.append(mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3])
+        flipped = np.linalg.det(matrix[:3, :3]) < 0
+        faces.append(np.asarray(mesh.faces)[:, ::-1 if flipped else 1] + count)
+        count += len(mesh.vertices)
+        # Those of the file; trimesh makes up others when asked.
+        if "vertex_normals" in getattr(getattr(mesh, "_cache", None), "cache", ()):
+            found["vertex_normals"].append(mesh.vertex_normals @ np.linalg.inv(matrix[:3, :3]))
+        if getattr(mesh.visual, "uv", None) is not None:  # whose v grows upwards
+            found["vertex_texcoords"].append(mesh.visual.uv * [1, -1] + [0, 1])
+        if mesh.visual.kind == "vertex":
+            colours = mesh.visual.vertex_colors[:, :3] / 255
+            found["vertex_color"].append(colours if linear else from_srgb(colours))
+        materials |= mesh.visual.kind in ("texture", "face")
+    whole = {n: np.concatenate(v) for n, v in found.items() if len(v) == len(meshes)}
+    dropped = [f"{n} of some parts" for n, v in found.items() if v and n not in whole]
+    dropped += ["materials and colours of faces"] * materials + ["what is no mesh"] * (others > 0)
+    return np.concatenate(positions), np.concatenate(faces), whole, dropped
 
 
 def _table(columns: dict[str, Any], attributes: dict[str, Any], kind: str, count: int) -> Any:

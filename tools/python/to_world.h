@@ -1,0 +1,55 @@
+#pragma once
+// Places of shapes, lights and cameras as matrices, and where a scene as it was read had them.
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "limn/core/matrix.h"
+#include "limn/core/scene.h"
+
+namespace limn::python {
+
+struct FirstPlaces {
+  struct ShapePlace {
+    SharedVector<Vec3f> positions;
+    SharedVector<Vec3d> normals;
+  };
+  std::vector<ShapePlace> shapes;
+  std::vector<Vec3d> lights;  // positions of delta lights; zero of those at infinity
+  Matrix4 environment;        // of a map: its axes, world space
+};
+
+// What is known of a scene since it was read.
+struct History {
+  // How far translations have moved [scene units], by name.
+  std::map<std::string, double> moved;
+  std::shared_ptr<const FirstPlaces> first;
+  // Of shapes, by their numbers: what to_world was set to, and where that put the vertices.
+  struct Placed {
+    Matrix4 to_world;
+    SharedVector<Vec3f> positions;
+  };
+  std::map<size_t, Placed> placed;
+
+  explicit History(const Scene& scene);
+};
+
+// The object of ID.to_world; false if the name is none, or of nothing that can be placed: shapes
+// (also by their emitters' ids), delta lights, environment maps, "sensor".
+bool names_place(const Scene& scene, const std::string& name);
+
+// Of a name that names_place takes. The camera's pose; of all others what leads from where they
+// were as the scene was read to where they are: of a shape whose vertices have not moved as a
+// whole the identity; of a point light a translation.
+Matrix4 to_world(const Scene& scene, const History& history, const std::string& name);
+
+// Places what the name says. Shapes are put from where they were read, or, if their vertices have
+// not moved as a whole since, from where they are: with the normals that the file gives.
+// InputError, with the scene unchanged, for matrices that are not affine and invertible or mirror;
+// of lights but points for scales and shears; of environment maps for axes but y; and for shapes
+// that move while a shutter is open.
+void place(Scene& scene, History& history, const std::string& name, const Matrix4& to_world,
+           std::vector<std::string>* warnings);
+
+}  // namespace limn::python
