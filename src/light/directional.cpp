@@ -57,6 +57,15 @@ void read_directional(Properties& properties, Scene& scene, Shape*) {
   scene.delta_lights.push_back(
       std::make_shared<DirectionalLight>(direction / size, read_power(properties, "irradiance")));
   scene.delta_lights.back()->id = properties.id();
+  Matrix4& to_world = scene.delta_lights.back()->to_world;
+  to_world = properties.transform("to_world");
+  if (!properties.has("direction")) return;
+  const Frame frame(direction / size);
+  for (int k = 0; k < 3; ++k) {
+    to_world.m[k][0] = frame.s[k];
+    to_world.m[k][1] = frame.t[k];
+    to_world.m[k][2] = frame.n[k];
+  }
 }
 
 }  // namespace limn

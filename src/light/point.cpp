@@ -49,6 +49,10 @@ void read_point(Properties& properties, Scene& scene, Shape*) {
   scene.delta_lights.push_back(
       std::make_shared<PointLight>(position, read_power(properties, "intensity")));
   scene.delta_lights.back()->id = properties.id();
+  Matrix4& to_world = scene.delta_lights.back()->to_world;
+  to_world = properties.transform("to_world");
+  if (properties.has("position"))
+    for (int k = 0; k < 3; ++k) to_world.m[k][3] = position[k];
 }
 
 }  // namespace limn

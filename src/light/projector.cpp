@@ -162,6 +162,7 @@ void read_projector(Properties& properties, Scene& scene, Shape*) {
       std::make_shared<Projector>(to_world.point({}), Axes{axes[0], axes[1], axes[2]}, irradiance,
                                   std::move(texture), read_half_frame(properties, aspect)));
   scene.delta_lights.back()->id = properties.id();
+  scene.delta_lights.back()->to_world = to_world;
 }
 
 }  // namespace limn

@@ -142,6 +142,7 @@ void read_spot(Properties& properties, Scene& scene, Shape*) {
                                                            read_power(properties, "intensity"),
                                                            Cone{cutoff, beam}, std::move(texture)));
   scene.delta_lights.back()->id = properties.id();
+  scene.delta_lights.back()->to_world = properties.transform("to_world");
 }
 
 }  // namespace limn

@@ -114,6 +114,7 @@ void set_mesh(Scene& scene, ShapeId shape, std::vector<Vec3f> positions,
                      "this shape needs");
   }
   changed.pivot.reset();
+  changed.to_world = {};
   changed.mesh =
       make_mesh(std::move(positions), std::move(faces),
                 changed.mesh.normal_source == NormalSource::kFace, changed.where, warnings);

@@ -530,6 +530,7 @@ class SceneBuilder {
     const std::vector<std::string> attributes = check_textures(shape, raw);
     options.file_faces = std::any_of(attributes.begin(), attributes.end(),
                                      [](const auto& name) { return name.starts_with("face_"); });
+    shape.to_world = options.to_world;
     shape.mesh = build_mesh(raw, options, &warnings_);
     add_attributes(raw, attributes, shape.mesh);
     check_attributes(shape);

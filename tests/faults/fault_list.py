@@ -292,7 +292,7 @@ FAULTS = [
           "if (affine_between(first.positions, shape.mesh.positions)) return first;", "(void)first;",
           "python", "test_to_world.py"),
     Fault("python", "pivot of a placed shape lost", PLACES,
-          "shape.pivot = Pivot{now, std::cbrt(determinant_of(to_world))};", "",
+          "shape.pivot = Pivot{now, std::cbrt(determinant_of(moved))};", "",
           "python", "test_to_world.py"),
     Fault("python", "angles of a placed light", PLACES,
           "std::atan2(-r.m[2][0], level)", "std::atan2(r.m[2][0], level)",

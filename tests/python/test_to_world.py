@@ -1,4 +1,4 @@
-"""Transforms in memory: scene["ID.to_world"] is what a file with that transform before its own has."""
+"""Transforms in memory: scene["ID.to_world"] is what a file with that transform has."""
 
 import limn
 import numpy as np
@@ -51,6 +51,13 @@ SCENE = """<scene version="3.0.0">
 </scene>"""
 
 
+# What the file has.
+FIRST = {"tent": T().scale(1.3), "floor": T().scale(4) @ T().rotate([1, 0, 0], -90),
+         "ball": T().translate([1, 2, 0]) @ T().scale(0.4), "bulb": T().translate([0, 3, 1]),
+         "beam": T().look_at([1, 5, 2], [0, 0, 0], [0, 1, 0]), "sun": T().rotate([1, 0, 0], 60),
+         "sky": T()}
+
+
 def load(folder, **added):
     """The scene, with further steps after the transforms of these objects."""
     text = SCENE
@@ -72,20 +79,21 @@ pytestmark = pytest.mark.filterwarnings("ignore:.*faces block")
 def test_is_what_a_file_with_it_has(tmp_path, name, matrix):
     scene, wanted = load(tmp_path), load(tmp_path, **{name: matrix})
     before = limn.render(scene, spp=4).value
-    np.testing.assert_allclose(scene[f"{name}.to_world"], np.eye(4), atol=1e-12)
-    scene.copy()[f"{name}.to_world"] = matrix
+    first = FIRST[name]
+    np.testing.assert_allclose(scene[f"{name}.to_world"], first.matrix, atol=1e-7)
+    scene.copy()[f"{name}.to_world"] = matrix @ first
     assert np.array_equal(limn.render(scene, spp=4).value, before)
-    for _ in range(2):  # from where the file has it
-        scene[f"{name}.to_world"] = matrix
+    for _ in range(2):  # in place of the file's
+        scene[f"{name}.to_world"] = matrix @ first
     if name not in ("sun", "bulb"):  # without place, without direction
-        np.testing.assert_allclose(scene[f"{name}.to_world"], matrix.matrix, atol=1e-6)
+        np.testing.assert_allclose(scene[f"{name}.to_world"], (matrix @ first).matrix, atol=1e-6)
     found, goal = (limn.render(s, spp=4).value for s in (scene, wanted))
     assert not np.allclose(found, before, rtol=1e-3)
     if name != "ball":  # of whose faces rounding chooses others
         np.testing.assert_allclose(found, goal, rtol=2e-3, atol=2e-4)
     if name in scene.shapes:
         np.testing.assert_allclose(*(s.mesh(name).positions for s in (scene, wanted)), atol=2e-6)
-    scene[f"{name}.to_world"] = np.eye(4)
+    scene[f"{name}.to_world"] = first
     np.testing.assert_allclose(limn.render(scene, spp=4).value, before, rtol=1e-3, atol=1e-4)
 
 
@@ -104,47 +112,50 @@ def test_the_camera_has_its_pose(scene):
 
 
 def test_follows_what_moves_a_shape(scene):
-    before = scene["tent.vertex_positions"].copy()
+    before, first = scene["tent.vertex_positions"].copy(), T(scene["tent.to_world"])
     center = (before.min(axis=0) + before.max(axis=0)) / 2
-    scene["tent.to_world"] = T().translate([1, 2, 3])
+    scene["tent.to_world"] = T().translate([1, 2, 3]) @ first
     assert [scene[f"tent.translate.{x}"] for x in "xyz"] == pytest.approx([1, 2, 3])
     scene.move("tent.rotate.y", np.pi / 2)
     scene.move("tent.scale", 0.5)
     scene["tent.translate.x"] = 0
     about = T().rotate([0, 1, 0], 90).scale(1.5) @ T().translate(-center)
-    wanted = (T().translate(center + [0, 2, 3]) @ about).matrix
+    wanted = (T().translate(center + [0, 2, 3]) @ about @ first).matrix
     np.testing.assert_allclose(scene["tent.to_world"], wanted, atol=1e-5)
     other = scene.copy()
     other["tent.to_world"] = scene["tent.to_world"]
     np.testing.assert_allclose(other["tent.vertex_positions"], scene["tent.vertex_positions"], atol=1e-5)
     other.move("tent.scale", -0.5)
-    np.testing.assert_allclose(np.linalg.det(other["tent.to_world"]), 1, rtol=1e-4)
+    np.testing.assert_allclose(*(np.linalg.det(m) for m in (other["tent.to_world"], first.matrix)),
+                               rtol=1e-4)
 
 
 def test_flat_shapes_have_a_transform(scene):
+    first = T(scene["floor.to_world"])
     scene.move("floor.rotate.x", 0.3)
     scene.move("floor.translate.y", 1)
     found = scene["floor.to_world"]
-    turn = T().translate([0, 1, 0]).rotate([1, 0, 0], np.degrees(0.3)).matrix
-    np.testing.assert_allclose(found, turn, atol=1e-6)
+    turn = T().translate([0, 1, 0]).rotate([1, 0, 0], np.degrees(0.3)) @ first
+    np.testing.assert_allclose(found, turn.matrix, atol=1e-6)
 
 
 def test_fits_keep_it(scene):
     fit = limn.Fit(scene, limn.render(scene, spp=2).value, ["tent.translate.x", "tent.rotate.y"], spp=2)
     fit.run(3)
     found = fit.scenes[0]
-    moved = found["tent.to_world"]
+    moved = found["tent.to_world"] @ np.linalg.inv(scene["tent.to_world"])
     assert not np.allclose(moved, np.eye(4))
     positions = scene["tent.vertex_positions"] @ moved[:3, :3].T + moved[:3, 3]
     np.testing.assert_allclose(positions, found["tent.vertex_positions"], atol=1e-5)
 
 
 def test_begins_anew_where_vertices_were_moved_one_by_one(scene):
+    first = T(scene["tent.to_world"])
     scene["tent.to_world"] = TURN
     scene.move("tent.vertex_positions.2.x", 0.2)
     bent = scene["tent.vertex_positions"].copy()
-    np.testing.assert_array_equal(scene["tent.to_world"], np.eye(4))
-    scene["tent.to_world"] = T().translate([0, 1, 0])
+    np.testing.assert_array_equal(scene["tent.to_world"], first.matrix)
+    scene["tent.to_world"] = T().translate([0, 1, 0]) @ first
     np.testing.assert_allclose(scene["tent.vertex_positions"], bent + [0, 1, 0], atol=1e-6)
     scene.set_mesh("tent", np.eye(3), [[0, 1, 2]])
     np.testing.assert_array_equal(scene["tent.to_world"], np.eye(4))
@@ -178,9 +189,10 @@ def test_not_what_moves_with_a_shutter(folder):
         '<sensor type="perspective"><float name="shutter_open" value="0"/>'
         '<float name="shutter_close" value="1"/>')
     scene = limn.load_string(text, folder)
+    first = scene["tent.to_world"]
     scene["tent.to_world"] = TURN  # at rest
     still = limn.render(scene, spp=2).value
-    scene["tent.to_world"] = T()
+    scene["tent.to_world"] = first
     scene["tent.velocity.x"] = 1
     with pytest.raises(limn.InputError, match="moves while a shutter is open"):
         scene["tent.to_world"] = TURN

@@ -197,6 +197,13 @@ Matrix4 light_to_world(DeltaLight& light, const Vec3d& first) {
          rotation_by_angles(vector_of(light, "rotate")) * translation(-first);
 }
 
+// As the file gives it.
+Matrix4 file_to_world(const Scene& scene, const History& history, const Object& object) {
+  if (object.light) return scene.delta_lights[*object.light]->to_world;
+  if (object.environment) return history.first->environment;
+  return scene.shapes[*object.shape].to_world;
+}
+
 Matrix4 axes_of(const Environment& environment) {
   const Environment::Grid grid = *environment.grid();
   return of_columns(grid.quarter, grid.pole, -grid.zero);
@@ -230,7 +237,8 @@ struct Failure {
   }
 };
 
-void place_shape(Scene& scene, History& history, size_t i, const Matrix4& to_world,
+// moved: from where the file has it.
+void place_shape(Scene& scene, History& history, size_t i, const Matrix4& moved,
                  const Failure& fail, std::vector<std::string>* warnings) {
   Shape& shape = scene.shapes[i];
   if (scene.exposure) {
@@ -240,23 +248,23 @@ void place_shape(Scene& scene, History& history, size_t i, const Matrix4& to_wor
     }
   }
   const FirstPlaces::ShapePlace start = start_of(shape, history, i);
-  std::vector<double> moved;
+  std::vector<double> positions;
   for (const Vec3f& p : start.positions) {
-    const Vec3d q = to_world.point(cast<double>(p));
-    moved.insert(moved.end(), {q.x, q.y, q.z});
+    const Vec3d q = moved.point(cast<double>(p));
+    positions.insert(positions.end(), {q.x, q.y, q.z});
   }
   const Vec3d center = bounds_of_faces(shape.mesh, start.positions).center();
-  find_parameter_or_array(scene, shape.id + ".vertex_positions").assign(scene, moved, warnings);
+  find_parameter_or_array(scene, shape.id + ".vertex_positions").assign(scene, positions, warnings);
   Mesh& mesh = shape.mesh;
   if (mesh.normal_source == NormalSource::kGiven && start.normals.size() == mesh.normals.size()) {
     for (size_t k = 0; k < start.normals.size(); ++k) {
-      const Vec3d n = to_world.normal(start.normals[k]);
+      const Vec3d n = moved.normal(start.normals[k]);
       mesh.normals[k] = n / length(n);
     }
     update_shading_normals(mesh);
   }
-  const Vec3d now = to_world.point(center);
-  shape.pivot = Pivot{now, std::cbrt(determinant_of(to_world))};
+  const Vec3d now = moved.point(center);
+  shape.pivot = Pivot{now, std::cbrt(determinant_of(moved))};
   if (scene.exposure) {
     Course& course = own_exposure(scene).shapes[i];
     course.translate(now - course.center);
@@ -267,26 +275,24 @@ void place_shape(Scene& scene, History& history, size_t i, const Matrix4& to_wor
   auto first = std::make_shared<FirstPlaces>(*history.first);
   first->shapes[i] = start;
   history.first = first;
-  history.placed[i] = {to_world, std::as_const(mesh).positions};
 }
 
-void place_light(DeltaLight& light, const Vec3d& first, const Matrix4& to_world,
-                 const Failure& fail) {
-  const Vec3d position = to_world.point(first);
+void place_light(DeltaLight& light, const Vec3d& first, const Matrix4& moved, const Failure& fail) {
+  const Vec3d position = moved.point(first);
   for (int k = 0; k < 3; ++k) {
     if (std::fabs(position[k]) > kLargestCoordinate) fail("would be too far away");
   }
   if (has_vector(light, "rotate")) {
-    if (!is_rotation(to_world)) fail("can be moved and rotated, not scaled or mirrored");
-    set_vector(light, "rotate", angles_of(to_world));
+    if (!is_rotation(moved)) fail("can be moved and rotated, not scaled or mirrored");
+    set_vector(light, "rotate", angles_of(moved));
   }
   set_vector(light, "translate", position);
 }
 
-void place_environment(Scene& scene, const History& history, const Matrix4& to_world,
+void place_environment(Scene& scene, const History& history, const Matrix4& moved,
                        const Failure& fail) {
-  if (!is_rotation(to_world)) fail("can be rotated, not scaled or mirrored");
-  const Matrix4 axes = to_world * history.first->environment;
+  if (!is_rotation(moved)) fail("can be rotated, not scaled or mirrored");
+  const Matrix4 axes = moved * history.first->environment;
   if (length(column(axes, 1) - Vec3d{0, 1, 0}) > kRounding) {
     fail("turns about the y axis alone: write other rotations into the file");
   }
@@ -319,19 +325,20 @@ bool names_place(const Scene& scene, const std::string& name) {
 Matrix4 to_world(const Scene& scene, const History& history, const std::string& name) {
   const Object object = find_object(scene, name).value();
   if (object.camera) return camera_to_world(scene);
+  const Matrix4 file = file_to_world(scene, history, object);
   if (object.light) {
-    return light_to_world(*scene.delta_lights[*object.light], history.first->lights[*object.light]);
+    return light_to_world(*scene.delta_lights[*object.light],
+                          history.first->lights[*object.light]) *
+           file;
   }
-  if (object.environment) {
-    return axes_of(*scene.environment) * transposed_linear(history.first->environment);
-  }
+  if (object.environment) return axes_of(*scene.environment);
   const SharedVector<Vec3f>& positions = scene.shapes[*object.shape].mesh.positions;
   const auto placed = history.placed.find(*object.shape);
   if (placed != history.placed.end() && placed->second.positions == positions) {
     return placed->second.to_world;
   }
   const auto map = affine_between(history.first->shapes[*object.shape].positions, positions);
-  return map.value_or(Matrix4{});
+  return map.value_or(Matrix4{}) * file;
 }
 
 void place(Scene& scene, History& history, const std::string& name, const Matrix4& to_world,
@@ -351,14 +358,18 @@ void place(Scene& scene, History& history, const std::string& name, const Matrix
   if (last[0] != 0 || last[1] != 0 || last[2] != 0 || last[3] != 1) {
     fail("has the last row 0, 0, 0, 1");
   }
-  if (!(determinant_of(to_world) > 0)) fail("must not mirror or flatten");
+  // From where the file has it.
+  const Matrix4 moved = to_world * file_to_world(scene, history, object).inverse();
+  if (!(determinant_of(moved) > 0)) fail("must not mirror or flatten");
   if (object.light) {
-    place_light(*scene.delta_lights[*object.light], history.first->lights[*object.light], to_world,
+    place_light(*scene.delta_lights[*object.light], history.first->lights[*object.light], moved,
                 fail);
   } else if (object.environment) {
-    place_environment(scene, history, to_world, fail);
+    place_environment(scene, history, moved, fail);
   } else {
-    place_shape(scene, history, *object.shape, to_world, fail, warnings);
+    place_shape(scene, history, *object.shape, moved, fail, warnings);
+    history.placed[*object.shape] = {to_world,
+                                     std::as_const(scene).shapes[*object.shape].mesh.positions};
   }
 }
 

@@ -39,13 +39,13 @@ struct History {
 // (also by their emitters' ids), delta lights, environment maps, "sensor".
 bool names_place(const Scene& scene, const std::string& name);
 
-// Of a name that names_place takes. The camera's pose; of all others what leads from where they
-// were as the scene was read to where they are: of a shape whose vertices have not moved as a
-// whole the identity; of a point light a translation.
+// Of a name that names_place takes: the camera's pose; of all others the transform that a file would
+// have for where they are, as Mitsuba's parameter of this name (spheres: with center and radius).
+// Of a shape whose vertices have not moved as a whole, that of the file.
 Matrix4 to_world(const Scene& scene, const History& history, const std::string& name);
 
-// Places what the name says. Shapes are put from where they were read, or, if their vertices have
-// not moved as a whole since, from where they are: with the normals that the file gives.
+// Places what the name says, in place of the file's transform. Shapes whose vertices have not moved
+// as a whole since they were read keep how these have moved. Normals are those that the file gives.
 // InputError, with the scene unchanged, for matrices that are not affine and invertible or mirror;
 // of lights but points for scales and shears; of environment maps for axes but y; and for shapes
 // that move while a shutter is open.

@@ -13,6 +13,7 @@
 
 #include "limn/core/bsdf.h"
 #include "limn/core/dual.h"
+#include "limn/core/matrix.h"
 #include "limn/core/mesh.h"
 #include "limn/core/rng.h"
 #include "limn/core/vec.h"
@@ -108,7 +109,8 @@ struct LightOrigin {
 
 class DeltaLight : public Light {
  public:
-  std::string id;  // "" if the file gives none
+  std::string id;    // "" if the file gives none
+  Matrix4 to_world;  // as read; of a position a translation, of a direction one that turns z there
 
   // Unoccluded light arriving at p. Nothing if p is outside the cone of a spot, or is the position
   // of the light itself.

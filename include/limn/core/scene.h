@@ -12,6 +12,7 @@
 #include "limn/core/environment.h"
 #include "limn/core/error.h"
 #include "limn/core/film.h"
+#include "limn/core/matrix.h"
 #include "limn/core/mesh.h"
 #include "limn/core/texture.h"
 
@@ -35,6 +36,9 @@ struct Shape {
   std::string id;  // "" if the file gives none
   SourceLocation where;
   Mesh mesh;
+  // As read: from the coordinates of the mesh's file, or of Mitsuba's shape of its kind (a sphere's
+  // has center and radius); the identity for curves and for meshes that are set later.
+  Matrix4 to_world;
   // None: the center of the mesh's bounds. The first motion as a whole (parameter.h) keeps where
   // that is, translations move it, and other meshes end it. So all motions since add up.
   std::optional<Pivot> pivot;

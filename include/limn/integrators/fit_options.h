@@ -7,7 +7,8 @@ namespace limn {
 
 inline constexpr const char* kPixels[] = {"adjoint", "uniform"};
 inline constexpr const char* kCaustics[] = {"paths", "particles"};
-inline constexpr Option kLossOption = choice("loss", kLosses, "Loss: l2, relative-l2, l1, l1-srgb or smape");
+inline constexpr Option kLossOption =
+    choice("loss", kLosses, "Loss: l2, relative-l2, l1, l1-srgb or smape");
 inline constexpr Option kPyramidOption{
     "pyramid",
     "Levels of an image pyramid, each half as large as the one before. The loss is the mean over "
