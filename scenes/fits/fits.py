@@ -524,7 +524,7 @@ def bad_starts(fits, _):
                 picture = Image.open(fits.path(folder, file)).convert("RGB")
                 size = (tile - 2, (tile - 2) * picture.height // picture.width)
                 picture = picture.resize(size, Image.Resampling.NEAREST)
-                frame.paste(labelled(picture, (name, "", variant)[k], 9),
+                frame.paste(labelled(picture, (name, "exact", "blurred")[k], 9),
                             ((i % across * 3 + k) * tile, i // across * high))
         frames.append(frame)
         rows.append([step, len(names)])

@@ -229,8 +229,8 @@ void bind_parameters(nb::module_& m, nb::class_<SceneHandle>& scene) {
       .def("__getitem__", get, nb::arg("name"),
            nb::sig("def __getitem__(self, name: str) -> float | numpy.ndarray | None"),
            "The value of a parameter, see limn.Parameter.value. \"ID.to_world\" of shapes, delta "
-           "lights and environment maps: (4, 4), float64, from where the file has them to where "
-           "they are; \"sensor.to_world\" is sensor_to_world.")
+           "lights and environment maps: (4, 4), float64, the to_world that a file would have for "
+           "where they are now; \"sensor.to_world\" is sensor_to_world.")
       .def(
           "__contains__",
           [](const SceneHandle& s, nb::handle name) {
@@ -238,7 +238,7 @@ void bind_parameters(nb::module_& m, nb::class_<SceneHandle>& scene) {
                                     names_place(s.get(), nb::cast<std::string>(name)));
           },
           nb::arg("name"), nb::sig("def __contains__(self, name: object) -> bool"),
-          "Has scene[name] a value?")
+          "Is scene[name] known?")
       .def(
           "__iter__",
           [](SceneHandle& s) { return nb::iter(nb::cast(names_of(ParametersView{&s}))); },
@@ -247,10 +247,10 @@ void bind_parameters(nb::module_& m, nb::class_<SceneHandle>& scene) {
       .def("__setitem__", assign, nb::arg("name"), nb::arg("value"),
            nb::sig("def __setitem__(self, name: str, value: numpy.typing.ArrayLike) -> None"),
            "Sets the value of a parameter: checked, copied; views that were taken stay as they "
-           "are. \"ID.to_world\": a matrix or limn.Transform that places the object from where the "
-           "file has it, as T @ scene[\"ID.to_world\"] does. It must not mirror, nor scale lights "
-           "but points; environment maps turn about y. limn.InputError for shapes that move "
-           "while a shutter is open.");
+           "are. \"ID.to_world\": a matrix or limn.Transform in place of the file's; "
+           "T @ scene[\"ID.to_world\"] adds T. It must not mirror the object as the file has it, "
+           "nor scale spots, projectors and directional lights; environment maps turn about y. "
+           "limn.InputError for shapes that move while a shutter is open.");
 }
 
 }  // namespace limn::python

@@ -110,7 +110,7 @@ struct LightOrigin {
 class DeltaLight : public Light {
  public:
   std::string id;    // "" if the file gives none
-  Matrix4 to_world;  // as read; of a position a translation, of a direction one that turns z there
+  Matrix4 to_world;  // as read; a position becomes a translation, a direction a rotation of z
 
   // Unoccluded light arriving at p. Nothing if p is outside the cone of a spot, or is the position
   // of the light itself.

@@ -8,7 +8,10 @@ namespace limn {
 inline constexpr const char* kPixels[] = {"adjoint", "uniform"};
 inline constexpr const char* kCaustics[] = {"paths", "particles"};
 inline constexpr Option kLossOption =
-    choice("loss", kLosses, "Loss: l2, relative-l2, l1, l1-srgb or smape");
+    choice("loss", kLosses, 
+           "Loss, a mean over pixels and channels of (I - T)^2 (l2), (I - T)^2 / (T^2 + 0.01) "
+           "(relative-l2), |I - T| (l1), the same of sRGB's encoded values (l1-srgb) or "
+           "|I - T| / (|I| + |T| + 0.01) (smape)");
 inline constexpr Option kPyramidOption{
     "pyramid",
     "Levels of an image pyramid, each half as large as the one before. The loss is the mean over "
