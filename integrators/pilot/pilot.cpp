@@ -75,7 +75,9 @@ class PilotEstimator final : public ProbingEstimator {
       if (!sums_[slot].empty()) sums_[slot].add(cell, sample.terms[slot]);
       if (!terms_->draws_at_vertices(slot)) continue;
       listing_[cell * slots() + slot] += sample.listing[slot];
-      if (pair) pairs_[slot].add(cell, sample.pair[slot][0], sample.pair[slot][1]);
+      // Terms may draw at some times alone.
+      if (pair && !pairs_[slot].empty())
+        pairs_[slot].add(cell, sample.pair[slot][0], sample.pair[slot][1]);
     }
     traced_[cell].add(sample.traced);
   }
@@ -113,9 +115,11 @@ class PilotRun {
       pilot_.take_fewer(sample % 2 == 1);
       std::unique_ptr<TermEstimator> there;
       if (at) {
+        const Stopwatch set_up;
         there = at(sample);
         there->set_plan(terms_.plan());
         pilot_.look_at(*there);
+        set_up_ += set_up.seconds();
       }
       const Batch batch{mix_bits(settings.seed + kStream), sample, sample + 1};
       const auto sums = run_batch(estimators_, batch, settings.threads, progress);
@@ -140,7 +144,7 @@ class PilotRun {
       figures.first_work.push_back((terms_.first_work(slot, costs_[slot]) + listing) / samples);
       all += work;
     }
-    figures.seconds_of_work = all > 0 ? seconds / all : 0;
+    figures.seconds_of_work = all > 0 ? (seconds - set_up_) / all : 0;
   }
 
   // A thousandth of the pixels that vary, those that do most, is left out: single bright samples
@@ -169,8 +173,9 @@ class PilotRun {
     const Lanes more = film_variance(slot, 1), fewer = film_variance(slot, 1, true);
     Lanes variance, kept;
     for (int lane = 0; lane < terms_.lanes(); ++lane) {
+      // Some at least: there are few times, and variances of both are noisy. Not tuned.
       const double drawn = std::clamp((fewer[lane] - more[lane]) / (1 / PilotEstimator::kFewer - 1),
-                                      0.0, more[lane]);
+                                      0.05 * more[lane], more[lane]);
       const double of_time = more[lane] - drawn;
       variance[lane] = of_time + share * drawn;
       kept[lane] = variance[lane] > 0 ? of_time / variance[lane] : 0;
@@ -196,6 +201,7 @@ class PilotRun {
   PilotEstimator& pilot_;
   std::vector<std::unique_ptr<SampleEstimator>> estimators_;
   std::vector<TermCost> costs_;
+  double set_up_ = 0;             // seconds
   std::vector<Moments> film_[2];  // of the film's usual samples, and of fewer
 };
 
@@ -287,7 +293,7 @@ PilotFigures run_pilot(const TermEstimator& estimator, bool turns, PilotSamples 
     figures.film_variance.push_back(on_film ? run.film_variance(slot, share) : Lanes{});
     figures.film_kept.emplace_back();
     figures.film_power.push_back(run.film_power(slot));
-    if (!at || !on_film) continue;
+    if (!at) continue;  // a term may use the film at some times alone
     const auto [variance, kept] = run.film_variance_of_times(slot, share);
     figures.film_variance.back() = variance;
     figures.film_kept.back() = kept;

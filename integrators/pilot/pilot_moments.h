@@ -96,6 +96,8 @@ class PairSums {
  public:
   PairSums(size_t cells, int parameters) : parameters_(parameters), cells_(cells * parameters) {}
 
+  bool empty() const { return cells_.empty(); }
+
   void add(size_t cell, const Rgb<Lanes>& one, const Rgb<Lanes>& two);
   // Without the thousandth of the cells that varies most.
   DrawShares shares(int parameter) const;

@@ -347,9 +347,10 @@ TEST_P(TimesAreUniform, InLargeBatches) {
   for (const auto& [numbers, spp, count] :
        {std::tuple{Numbers::kIndependent, 560, 17}, {Numbers::kEvenInRun, 1056, 32}}) {
     double sum = 0, squares = 0;
-    int batches = 0;
+    int batches = 0, times = 0;
     for (int seed = 0; seed < 50; ++seed) {
       const auto at = [&](double u) {
+        ++times;
         EstimatorsAtTime now;
         now.list.push_back(std::make_unique<Clock>(scene, u, numbers));
         return now;
@@ -364,7 +365,10 @@ TEST_P(TimesAreUniform, InLargeBatches) {
         squares += off * off;
         ++batches;
       };
+      times = -1;
       run_batches(at(0).list, settings, Stopwatch(), take, at);
+      EXPECT_EQ(times < spp, GetParam()) << times;
+      EXPECT_LE(times, spp);
     }
     ASSERT_GE(batches, 50);
     const double rms = std::sqrt(squares / batches);

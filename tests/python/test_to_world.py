@@ -173,7 +173,7 @@ def test_what_is_refused_and_why(tmp_path, scene):
             (scene, "tent", np.full((4, 4), np.nan), "finite"),
             (scene, "tent", T().translate([1e13, 0, 0]), "cannot be 1e"),
             (scene, "sensor", T().scale(2), "camera"),
-            (placed, "beam", T().scale(2), "moved and rotated"),
+            (placed, "beam", T().scale([1, 2, 1]), "moved and rotated"),
             (placed, "sky", T().rotate([1, 0, 0], 20), "about the y axis alone"),
             (scene, "tend", np.eye(4), "tend.to_world")):
         before = limn.render(where, spp=1).value
@@ -199,3 +199,26 @@ def test_not_what_moves_with_a_shutter(folder):
     scene["tent.velocity.x"] = 0
     scene["tent.to_world"] = TURN
     assert np.array_equal(limn.render(scene, spp=2).value, still)
+
+
+def test_goes_on_in_other_scenes(scene):
+    scene["tent.to_world"] = TURN
+    covered = limn.coverage(scene)
+    np.testing.assert_allclose(covered["tent.to_world"], TURN.matrix)
+    covered["tent.to_world"] = covered["tent.to_world"]
+    np.testing.assert_allclose(*(s["tent.vertex_positions"] for s in (covered, scene)), atol=1e-6)
+    scene.set_mesh("tent", np.eye(3) + 1, [[0, 1, 2]])
+    before = scene["tent.vertex_positions"].copy()
+    scene["tent.to_world"] = scene["tent.to_world"]
+    np.testing.assert_allclose(scene["tent.vertex_positions"], before, atol=1e-6)
+
+
+def test_small_far_shapes_are_placed_again(scene):
+    small = T().translate([7, -3, 5]).rotate([1, 2, 3], 40).scale(0.01)
+    for step in (0.1, 0.2):
+        scene["floor.to_world"] = T().translate([step, 0, 0]) @ small
+        scene.move("floor.translate.y", 0.001)
+        found = scene["floor.to_world"]
+        assert np.linalg.det(found) > 0
+        wanted = (T().translate([step, 0.001, 0]) @ small).matrix
+        np.testing.assert_allclose(found, wanted, atol=2e-6)

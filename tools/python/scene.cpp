@@ -179,6 +179,7 @@ void bind_changes(nb::class_<SceneHandle>& scene) {
             const ShapeId id = find_shape(s.get(), shape);
             std::vector<std::string> warnings;
             set_mesh(s.edit(), id, to_positions(positions), to_faces(faces), &warnings);
+            s.history.forget(s.get(), id.index());
             warn_all(warnings);
           },
           nb::arg("shape"), nb::arg("positions"), nb::arg("faces"),
@@ -305,7 +306,14 @@ nb::class_<SceneHandle> bind_scene(nb::module_& m) {
         "that derivatives have all edges (0.003), plastics a few percent darker; 0: they stay "
         "smooth. Raises limn.InputError with file, line and column.");
   m.def(
-      "coverage", [](const SceneHandle& s) { return SceneHandle(coverage_of(s.get())); },
+      "coverage",
+      [](const SceneHandle& s) {
+        Scene coverage = coverage_of(s.get());
+        for (Shape& shape : coverage.shapes) {
+          shape.to_world = to_world(s.get(), s.history, shape.id + ".to_world");
+        }
+        return SceneHandle(std::move(coverage));
+      },
       nb::arg("scene"), nb::sig("def coverage(scene: Scene) -> Scene"),
       "A scene whose image is the coverage (alpha) of `scene` less 1: for derivatives of coverage, "
       "and losses against masks less 1. It has the parameters of shapes and cameras; every surface "

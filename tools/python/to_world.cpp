@@ -86,10 +86,10 @@ Vec3d mean_of(const SharedVector<Vec3f>& points) {
 }
 
 // The normal of the plane that points lie in, of their second moments; none if they fill space or
-// lie on a line.
-std::optional<Vec3d> plane_normal(const Matrix4& moments) {
+// lie on a line. rounding: of the moments across it.
+std::optional<Vec3d> plane_normal(const Matrix4& moments, double rounding) {
   const double size = moments.m[0][0] + moments.m[1][1] + moments.m[2][2];
-  if (determinant_of(moments) > 1e-12 * size * size * size) return std::nullopt;
+  if (determinant_of(moments) > size * size * std::max(1e-12 * size, rounding)) return std::nullopt;
   Vec3d longest;
   for (int k = 0; k < 3; ++k) {
     const Vec3d n = cross(column(moments, k), column(moments, (k + 1) % 3));
@@ -108,12 +108,15 @@ std::optional<Matrix4> affine_between(const SharedVector<Vec3f>& from,
   const Vec3d start = mean_of(from), end = mean_of(to);
   Matrix4 moments{{}}, mixed{{}};
   moments.m[3][3] = 1;
+  constexpr double kFloats = 3e-7;  // of coordinates, a few roundings; not tuned
+  double rounding = 0;
   for (size_t i = 0; i < from.size(); ++i) {
     const Vec3d p = cast<double>(from[i]) - start, q = cast<double>(to[i]) - end;
     add_product(moments, p, p);
     add_product(mixed, q, p);
+    rounding += kFloats * kFloats * length_squared(cast<double>(from[i]));
   }
-  const std::optional<Vec3d> normal = plane_normal(moments);
+  const std::optional<Vec3d> normal = plane_normal(moments, rounding);
   if (normal) {
     const double size = moments.m[0][0] + moments.m[1][1] + moments.m[2][2];
     add_product(moments, *normal * size, *normal);
@@ -132,13 +135,15 @@ std::optional<Matrix4> affine_between(const SharedVector<Vec3f>& from,
   }
   linear.m[3][3] = 1;
   const Matrix4 map = translation(end) * linear * translation(-start);
-  double largest = 0, worst = 0;
+  double largest = 0, widest = 0, worst = 0;
   for (size_t i = 0; i < from.size(); ++i) {
     const Vec3d q = cast<double>(to[i]);
     worst = std::max(worst, length(map.point(cast<double>(from[i])) - q));
     largest = std::max(largest, length(q));
+    widest = std::max(widest, length(q - end));
   }
-  if (!(worst <= 1e-5 * largest) || !(determinant_of(map) > 0)) return std::nullopt;
+  const double most = 1e-5 * widest + kFloats * largest;
+  if (!(worst <= most) || !(determinant_of(map) > 0)) return std::nullopt;
   return map;
 }
 
@@ -209,11 +214,6 @@ Matrix4 axes_of(const Environment& environment) {
   return of_columns(grid.quarter, grid.pole, -grid.zero);
 }
 
-Matrix4 transposed_linear(const Matrix4& a) {
-  return of_columns({a.m[0][0], a.m[0][1], a.m[0][2]}, {a.m[1][0], a.m[1][1], a.m[1][2]},
-                    {a.m[2][0], a.m[2][1], a.m[2][2]});
-}
-
 Bounds bounds_of_faces(const Mesh& mesh, const SharedVector<Vec3f>& positions) {
   Bounds bounds;
   for (const FaceIndices& face : mesh.faces) {
@@ -277,20 +277,41 @@ void place_shape(Scene& scene, History& history, size_t i, const Matrix4& moved,
   history.first = first;
 }
 
-void place_light(DeltaLight& light, const Vec3d& first, const Matrix4& moved, const Failure& fail) {
-  const Vec3d position = moved.point(first);
+// The axes of a transform without their lengths, z first, and its place.
+Matrix4 rigid(const Matrix4& a) {
+  const Vec3d z = normalize(column(a, 2));
+  const Vec3d x = normalize(column(a, 0) - z * dot(z, column(a, 0)));
+  return translation(column(a, 3)) * of_columns(x, cross(z, x), z);
+}
+
+// As files have it: spots and projectors may be scaled evenly.
+void check_even(const Matrix4& a, const Failure& fail) {
+  const double size2 = length_squared(column(a, 0));
+  for (int k = 0; k < 3; ++k) {
+    const double across = dot(column(a, k), column(a, (k + 1) % 3));
+    if (std::fabs(across) > 1e-4 * size2 ||
+        std::fabs(length_squared(column(a, k)) - size2) > 1e-4 * size2) {
+      fail("can be moved and rotated, not sheared or scaled unevenly");
+    }
+  }
+}
+
+void place_light(DeltaLight& light, const Matrix4& to_world, const Failure& fail) {
+  const Vec3d position = column(to_world, 3);
   for (int k = 0; k < 3; ++k) {
     if (std::fabs(position[k]) > kLargestCoordinate) fail("would be too far away");
   }
   if (has_vector(light, "rotate")) {
-    if (!is_rotation(moved)) fail("can be moved and rotated, not scaled or mirrored");
-    set_vector(light, "rotate", angles_of(moved));
+    if (has_vector(light, "translate")) check_even(to_world, fail);
+    set_vector(light, "rotate", angles_of(rigid(to_world) * rigid(light.to_world).inverse()));
   }
   set_vector(light, "translate", position);
 }
 
 void place_environment(Scene& scene, const History& history, const Matrix4& moved,
                        const Failure& fail) {
+  if (determinant_of(history.first->environment) < 0)
+    fail("is mirrored in the file: turn it there");
   if (!is_rotation(moved)) fail("can be rotated, not scaled or mirrored");
   const Matrix4 axes = moved * history.first->environment;
   if (length(column(axes, 1) - Vec3d{0, 1, 0}) > kRounding) {
@@ -316,6 +337,13 @@ History::History(const Scene& scene) {
     places.environment = axes_of(*scene.environment);
   }
   first = std::make_shared<const FirstPlaces>(std::move(places));
+}
+
+void History::forget(const Scene& scene, size_t shape) {
+  auto places = std::make_shared<FirstPlaces>(*first);
+  places->shapes[shape] = {scene.shapes[shape].mesh.positions, scene.shapes[shape].mesh.normals};
+  first = places;
+  placed.erase(shape);
 }
 
 bool names_place(const Scene& scene, const std::string& name) {
@@ -359,12 +387,15 @@ void place(Scene& scene, History& history, const std::string& name, const Matrix
     fail("has the last row 0, 0, 0, 1");
   }
   // From where the file has it.
-  const Matrix4 moved = to_world * file_to_world(scene, history, object).inverse();
-  if (!(determinant_of(moved) > 0)) fail("must not mirror or flatten");
+  const Matrix4 file = file_to_world(scene, history, object);
   if (object.light) {
-    place_light(*scene.delta_lights[*object.light], history.first->lights[*object.light], moved,
-                fail);
-  } else if (object.environment) {
+    if (!(determinant_of(to_world) * determinant_of(file) > 0)) fail("must not mirror or flatten");
+    place_light(*scene.delta_lights[*object.light], to_world, fail);
+    return;
+  }
+  const Matrix4 moved = to_world * file.inverse();
+  if (!(determinant_of(moved) > 0)) fail("must not mirror or flatten");
+  if (object.environment) {
     place_environment(scene, history, moved, fail);
   } else {
     place_shape(scene, history, *object.shape, moved, fail, warnings);

@@ -33,19 +33,21 @@ struct History {
   std::map<size_t, Placed> placed;
 
   explicit History(const Scene& scene);
+  // Of a shape that has another mesh, which is where it was read.
+  void forget(const Scene& scene, size_t shape);
 };
 
 // The object of ID.to_world; false if the name is none, or of nothing that can be placed: shapes
 // (also by their emitters' ids), delta lights, environment maps, "sensor".
 bool names_place(const Scene& scene, const std::string& name);
 
-// Of a name that names_place takes: the camera's pose; of all others the transform that a file would
-// have for where they are, as Mitsuba's parameter of this name (spheres: with center and radius).
-// Of a shape whose vertices have not moved as a whole, that of the file.
+// Of a name that names_place takes: the camera's pose; of all others the transform that a file
+// would have for where they are, as Mitsuba's parameter of this name (spheres: with center and
+// radius). Of shapes deformed by no affine map, the file's.
 Matrix4 to_world(const Scene& scene, const History& history, const std::string& name);
 
-// Places what the name says, in place of the file's transform. Shapes whose vertices have not moved
-// as a whole since they were read keep how these have moved. Normals are those that the file gives.
+// Places what the name says, in place of the file's transform. Shapes deformed by no affine map
+// keep their deformation. Normals are those that the file gives.
 // InputError, with the scene unchanged, for matrices that are not affine and invertible or mirror;
 // of lights but points for scales and shears; of environment maps for axes but y; and for shapes
 // that move while a shutter is open.

@@ -134,7 +134,7 @@ def markdown(stored_records):
             lines.append(f"| {family.name} | {knob} | " + " | ".join(row) + " |")
     if right:
         lines += ["", *textwrap.wrap("Every method is right in: " + "; ".join(right) + ".", 100)]
-    lines += ["", f"Each run takes {seconds_of(stored_records)} s. {commit_line()}"]
+    lines += ["", f"Each run takes {seconds_of(stored_records)} s.\n{commit_line()}"]
     lines += textwrap.wrap(against_others_text(stored_records), 100) + [""]
     used = [w for w in ORDER if any(w in verdicts(rs, m) for _, rs in stored_records
                                     for m in methods)]
