@@ -8,7 +8,7 @@ namespace limn {
 inline constexpr const char* kPixels[] = {"adjoint", "uniform"};
 inline constexpr const char* kCaustics[] = {"paths", "particles"};
 inline constexpr Option kLossOption =
-    choice("loss", kLosses, 
+    choice("loss", kLosses,
            "Loss, a mean over pixels and channels of (I - T)^2 (l2), (I - T)^2 / (T^2 + 0.01) "
            "(relative-l2), |I - T| (l1), the same of sRGB's encoded values (l1-srgb) or "
            "|I - T| / (|I| + |T| + 0.01) (smape)");
