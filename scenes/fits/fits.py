@@ -395,7 +395,7 @@ class Start:
     # Of a start that overlaps its target: defines, and the truth's values from there.
     near: tuple = ()
     steps: int = 60
-    caustic: bool = False  # particles find it
+    caustic: object = None  # that particles find: the defines that show it, of the parameters' values
     options: str = "--spp 4 --step 4 --step-half-life 20 --snapshots 5"
 
 
@@ -435,10 +435,11 @@ REGULARISED = {
                      options="--spp 4 --step 20 --step-half-life 20 --snapshots 5"),
     "index": Start("pane", ["glass.eta"], 0.04, ["ior=1.1"], ["ior=1.9"], [1.9], 0.8, (["ior=1.8"], [1.9]), 90),
     "caustic index": Start("lens", ["glass.eta"], 0.01, ["ior=1.15"], ["ior=1.5"], [1.5], 0.35,
-                             (["ior=1.45"], [1.5]), caustic=True),
+                             (["ior=1.45"], [1.5]), caustic=lambda index: [f"ior={index}"]),
     "caustic place": Start("lens", moves("pane", "xz"), 0.1, [*OVER_LAMP, "x=0.25"],
                            [*OVER_LAMP, "x=-0.25", "z=0.1"], [-0.5, 0.1], 0.51,
-                           ([*OVER_LAMP, "x=-0.2", "z=0.1"], [-0.05, 0]), caustic=True,
+                           ([*OVER_LAMP, "x=-0.2", "z=0.1"], [-0.05, 0]),
+                           caustic=lambda x, z: [*OVER_LAMP, f"x={0.25 + x}", f"z={z}"],
                            options="--spp 16 --step 12 --step-half-life 20 --snapshots 5"),
     "vertices": Start("torus", ["torus.vertex_positions"], 0.4, ["mesh=OUT/cube.obj", "x=0.9"],
                       ["mesh=OUT/rough.obj", "x=-0.9"], [], 0,
@@ -508,6 +509,16 @@ def regularised(fits, _):
     return ["fit", "exact", "pyramid", "blurred", "particles or good start", "good start"], rows
 
 
+def caustic_at(fits, start, folder, step):
+    """A picture of a caustic after so many steps of a fit, whose snapshots are of paths."""
+    goes = read_json(fits.path(folder, "fit.json"))["history"]
+    values = list(goes[max(step, 1) - 1]["values"].values())
+    defines = [d.replace("OUT", os.path.abspath(fits.out)) for d in
+               ["mesh=OUT/lens.obj", "format=obj", *start.caustic(*values)]]
+    return fits.render(f"../regularised/{start.scene}", f"{folder}_{step}.exr", defines,
+                       "--spp 64 --method light-traced")[:-3] + "png"
+
+
 def bad_starts(fits, _):
     """Targets, exact and blurred fits, step by step."""
     from PIL import Image
@@ -517,14 +528,17 @@ def bad_starts(fits, _):
     for step in range(0, 95, 5):
         frame = Image.new("RGB", (across * 3 * tile, -(-len(names) // across) * high), "white")
         for i, name in enumerate(names):
-            for k, variant in enumerate(("target", "exact", "blurred")):
+            blurred = "particles" if REGULARISED[name].caustic else "blurred"
+            for k, variant in enumerate(("target", "exact", blurred)):
                 folder = folder_of(name, f"{'exact' if k == 0 else variant} 1")
                 at = min(step, REGULARISED[name].steps)
                 file = "view_0_target.png" if k == 0 else f"step_{at:05}_view_0.png"
-                picture = Image.open(fits.path(folder, file)).convert("RGB")
+                picture = Image.open(caustic_at(fits, REGULARISED[name], folder, at)
+                                     if REGULARISED[name].caustic and k else
+                                     fits.path(folder, file)).convert("RGB")
                 size = (tile - 2, (tile - 2) * picture.height // picture.width)
                 picture = picture.resize(size, Image.Resampling.NEAREST)
-                frame.paste(labelled(picture, (name, "exact", "blurred")[k], 9),
+                frame.paste(labelled(picture, (name, "exact", blurred)[k], 9),
                             ((i % across * 3 + k) * tile, i // across * high))
         frames.append(frame)
         rows.append([step, len(names)])
@@ -646,6 +660,13 @@ SHOWN = [
 ]
 
 
+def step_label(folder, step):
+    variant = folder.split("_", 1)[1].replace("_", " ")
+    if variant != "seed 1":
+        return variant
+    return f"{step} steps" if step else "start"
+
+
 def picture(fits, _):
     from PIL import Image
 
@@ -657,9 +678,9 @@ def picture(fits, _):
         for x, mesh in enumerate(meshes):
             view = [f"mesh={os.path.abspath(mesh)}", f"format={mesh[-3:]}", f"width={tile}"]
             file = fits.render("eight_views", f"picture/{y}_{x}.exr", view, "--spp 64", 7)
-            label = f"{shown[x - 1][0].split('_', 1)[1]} {shown[x - 1][1]}" if x else "truth"
+            label = step_label(*shown[x - 1]) if x else "truth"
             shape = Image.open(file[:-3] + "png").convert("RGB")
-            whole.paste(labelled(shape, label.replace("_", " "), 11), (tile * x, high * y))
+            whole.paste(labelled(shape, label, 11), (tile * x, high * y))
         table.append([os.path.basename(truth), "truth", *(f"{f} {step}" for f, step in shown)])
     whole.save(os.path.join(ROOT, "scenes", "pictures", "fits.webp"), quality=80, method=6)
     return ["row", *([""] * 7)], table
