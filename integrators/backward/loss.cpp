@@ -16,7 +16,7 @@ namespace limn {
 
 namespace {
 
-// Of srgb_encode().
+// The derivative of srgb_encode().
 double srgb_slope(double linear) {
   return linear <= kSrgbLinear ? 12.92 : 1.055 / 2.4 * std::pow(linear, 1 / 2.4 - 1);
 }

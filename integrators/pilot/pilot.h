@@ -66,13 +66,13 @@ struct PilotSamples {
 double seconds_of_pixel(const TermEstimator& estimator, bool turns, const RunSettings& settings,
                         const Stopwatch& watch);
 
-// What a sample of a pilot is of, where samples have times.
+// Makes the estimator of one sample of a pilot, where samples have times: at that sample's time.
 using TermsAt = std::function<std::unique_ptr<TermEstimator>(int sample)>;
 
 // turns: whether turns of directions at first vertices are looked at. settings: its limit of time
 // is what all pilots and the samples behind them share, which `watch` has timed since they began; a
-// pilot takes what pilot_samples_in_time says, the samples before these included. at: each sample
-// is of these in place of the estimator, with its plan.
+// pilot takes what pilot_samples_in_time says, the samples before these included. at: makes
+// each sample's estimator, which gets the plan of `estimator`; empty: all samples are of that one.
 PilotFigures run_pilot(const TermEstimator& estimator, bool turns, PilotSamples samples,
                        const RunSettings& settings, const Stopwatch& watch, const TermsAt& at = {});
 

@@ -119,7 +119,7 @@ TEST(Losses, OfAPyramidAreThoseOfItsBlocks) {
   EXPECT_THROW(image_loss(scene, target, {.method = "rays"}, settings, mask), InputError);
 }
 
-// What image_loss() gives with one value of image and target, where images have no noise.
+// The loss of images without noise that have one value everywhere, as the target does.
 double loss_of_one(LossKind kind, double image, double target) {
   const auto encoded = [](double v) {
     return v <= 0.0031308 ? 12.92 * v : 1.055 * std::pow(v, 1 / 2.4) - 0.055;
@@ -140,8 +140,8 @@ double loss_of_one(LossKind kind, double image, double target) {
   return NAN;
 }
 
-// Of a sky alone, which every pixel shows without noise; dark, in the line of sRGB's curve, and
-// bright; targets above and below, and below zero.
+// Every pixel shows a sky, without noise: its channels are dark (on the line of sRGB's curve),
+// medium and bright. Targets lie above, below, and below zero.
 TEST(Losses, AreTheirFormulas) {
   const TempFiles files;
   SceneParts parts;

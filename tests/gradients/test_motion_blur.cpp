@@ -379,8 +379,8 @@ TEST_P(TimesAreUniform, InLargeBatches) {
 INSTANTIATE_TEST_SUITE_P(MotionBlur, TimesAreUniform, testing::Bool(),
                          [](const auto& kind) { return kind.param ? "some_times" : "all_times"; });
 
-// What a board's shadow leaves of its error at one time is less than what differs between times: a
-// pilot that looked at one time alone took 19 samples of it for each of a pixel.
+// A board's shadow varies more between times than at one: more samples of it at one time hardly
+// help. A pilot that looked at one time alone took 32 samples of it for each of a pixel.
 TEST(MotionBlur, IsWorthMoreTimesThanSamplesAtOne) {
   SceneParts parts;
   parts.origin = {0, 3, 6};

@@ -86,7 +86,7 @@ def methods_page():
 MAP = '<texture name="NAME" type="bitmap"><string name="filename" value="map.hdr"/>' \
       '<boolean name="raw" value="true"/></texture>'
 NESTED = '<bsdf type="diffuse" id="nested_ID"/>'
-# What types need inside.
+# The elements that a type cannot do without.
 INSIDE = {
     "bsdf": {"blendbsdf": '<float name="weight" value="0.5"/>' + NESTED + NESTED.replace("_", "_2_"),
              "bumpmap": MAP + NESTED, "mask": '<float name="opacity" value="0.5"/>' + NESTED,

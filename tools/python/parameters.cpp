@@ -249,7 +249,7 @@ void bind_parameters(nb::module_& m, nb::class_<SceneHandle>& scene) {
            "Sets the value of a parameter: checked, copied; views that were taken stay as they "
            "are. \"ID.to_world\": a matrix or limn.Transform in place of the file's; "
            "T @ scene[\"ID.to_world\"] adds T. It must not mirror the object as the file has it, "
-           "nor scale spots, projectors and directional lights; environment maps turn about y. "
+           "nor scale spots and projectors unevenly; environment maps turn about y. "
            "limn.InputError for shapes that move while a shutter is open.");
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-// Places of shapes, lights and cameras as matrices, and where a scene as it was read had them.
+// Poses of shapes, lights and cameras as matrices, and those that a scene was read with.
 #include <map>
 #include <memory>
 #include <string>
@@ -37,8 +37,8 @@ struct History {
   void forget(const Scene& scene, size_t shape);
 };
 
-// The object of ID.to_world; false if the name is none, or of nothing that can be placed: shapes
-// (also by their emitters' ids), delta lights, environment maps, "sensor".
+// Whether the name is ID.to_world of something that can be placed: a shape (also by its emitter's
+// id), a delta light, an environment map or "sensor".
 bool names_place(const Scene& scene, const std::string& name);
 
 // Of a name that names_place takes: the camera's pose; of all others the transform that a file
@@ -49,8 +49,8 @@ Matrix4 to_world(const Scene& scene, const History& history, const std::string& 
 // Places what the name says, in place of the file's transform. Shapes deformed by no affine map
 // keep their deformation. Normals are those that the file gives.
 // InputError, with the scene unchanged, for matrices that are not affine and invertible or mirror;
-// of lights but points for scales and shears; of environment maps for axes but y; and for shapes
-// that move while a shutter is open.
+// for spots and projectors that are scaled unevenly or sheared; for environment maps that turn about
+// another axis than y; and for shapes that move while a shutter is open.
 void place(Scene& scene, History& history, const std::string& name, const Matrix4& to_world,
            std::vector<std::string>* warnings);
 

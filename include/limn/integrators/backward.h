@@ -116,8 +116,8 @@ std::vector<ReverseCheck> check_reverse(const Scene& scene, const BackwardOption
 enum class LossKind {
   kL2,          // (I - T)^2
   kRelativeL2,  // (I - T)^2 / (T^2 + 0.01): weights from the target alone
-  // Of the images' mean I. They and their adjoints are biased where the noise of I is not small
-  // beside I - T.
+  // I: the mean of both images. These losses and their adjoints are biased where the noise of I is
+  // not small beside I - T.
   kL1,      // |I - T|
   kL1Srgb,  // |e(I) - e(T)|, e: sRGB's transfer function, not clamped
   kSmape,   // |I - T| / (|I| + |T| + 0.01)
@@ -125,7 +125,7 @@ enum class LossKind {
 inline constexpr const char* kLosses[] = {"l2", "relative-l2", "l1", "l1-srgb",
                                           "smape"};  // by their numbers
 inline bool is_unbiased(LossKind kind) { return kind <= LossKind::kRelativeL2; }
-// Others weigh dark values as eyes or relative errors do.
+// Coverage is no radiance, whose dark values the other losses stress.
 inline bool suits_coverage(LossKind kind) { return kind == LossKind::kL2 || kind == LossKind::kL1; }
 // The warning about a loss that is biased.
 std::string bias_warning(LossKind kind);
