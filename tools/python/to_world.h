@@ -48,9 +48,9 @@ Matrix4 to_world(const Scene& scene, const History& history, const std::string& 
 
 // Places what the name says, in place of the file's transform. Shapes deformed by no affine map
 // keep their deformation. Normals are those that the file gives.
-// InputError, with the scene unchanged, for matrices that are not affine and invertible or mirror;
-// for spots and projectors that are scaled unevenly or sheared; for environment maps that turn about
-// another axis than y; and for shapes that move while a shutter is open.
+// InputError, with the scene unchanged, for matrices that are not affine and invertible or
+// mirror; for spots and projectors that are scaled unevenly or sheared; for environment maps
+// that turn about another axis than y; and for shapes that move while a shutter is open.
 void place(Scene& scene, History& history, const std::string& name, const Matrix4& to_world,
            std::vector<std::string>* warnings);
 
