@@ -88,6 +88,7 @@ DualFit fit_dual(std::span<const Wedge> wedges, const NodeFrame& frame,
   static thread_local std::vector<Vector4d> planes;
   static thread_local std::vector<Vector3d> points;
   planes.clear();
+  planes.reserve(2 * wedges.size());
   for (const Wedge& wedge : wedges)
     for (const Plane& plane : wedge.planes) planes.push_back(dual_point(plane, frame));
   const Vector4d z = normaliser_of(planes);
@@ -98,6 +99,7 @@ DualFit fit_dual(std::span<const Wedge> wedges, const NodeFrame& frame,
   for (Vector4d& q : planes) q /= q.dot(z);
   const Matrix<double, 4, 3> basis = complement_of(z);
   points.clear();
+  points.reserve(planes.size());
   for (const Vector4d& q : planes) points.push_back(basis.transpose() * q);
   fit_box(points, z, config, fit);
   sum_cover(wedges, points, fit);

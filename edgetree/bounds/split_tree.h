@@ -72,6 +72,9 @@ SplitTree<Width> split_tree(uint32_t edges, int threads, const NodeOver& node_ov
     const EdgeRange range = tree.nodes[pending[i].node].ranges[pending[i].lane];
     append_subtree<Width>(range, 0, node_over, parts[i], nullptr);
   });
+  size_t nodes = tree.nodes.size();
+  for (const auto& part : parts) nodes += part.size();
+  tree.nodes.reserve(nodes);
   for (size_t i = 0; i < parts.size(); ++i) {
     const auto offset = static_cast<uint32_t>(tree.nodes.size());
     tree.parts.push_back(offset);
@@ -81,6 +84,7 @@ SplitTree<Width> split_tree(uint32_t edges, int threads, const NodeOver& node_ov
         if (child != 0) child += offset;
       tree.nodes.push_back(node);
     }
+    parts[i] = {};
   }
   tree.parts.push_back(static_cast<uint32_t>(tree.nodes.size()));
   return tree;

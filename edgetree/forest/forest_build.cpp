@@ -406,6 +406,12 @@ static std::vector<KeptTree>* kept_of(SharedObjects* shared, ShapeId object) {
   return &shared->trees->objects[object.index()];
 }
 
+size_t expected_edge_nodes(const EdgeSamplerInput& input) {
+  size_t edges = 0;
+  for (const EdgeMesh& mesh : input.objects) edges += mesh.edges.size();
+  return edges * 4 / (3 * kWidth) + input.objects.size();
+}
+
 std::optional<ForestGroup> group_of(const EdgeMesh& mesh, const Edge& edge, bool cull_concave) {
   switch (edge.edge_class) {
     case EdgeClass::kSmooth:
@@ -442,6 +448,9 @@ NodeFrame frame_of(const Bounds& box) {
 Forest build_forest(const EdgeSamplerInput& input, int threads, const ForestConfig& config,
                     SharedObjects* shared) {
   Forest forest;
+  // To grow, a vector holds its elements twice. Room that is not used takes no memory.
+  forest.edges.reserve(expected_edge_nodes(input));
+  forest.inner.reserve(expected_edge_nodes(input) / 2);
   forest.motions.emplace_back();
   std::vector<uint32_t> motions;
   for (const EdgeMesh& mesh : input.objects)

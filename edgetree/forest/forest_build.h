@@ -60,6 +60,9 @@ NodeFrame frame_of(const Bounds& box);
 Forest build_forest(const EdgeSamplerInput& input, int threads, const ForestConfig& config,
                     SharedObjects* shared = nullptr);
 
+// At most so many nodes of edges are expected: three quarters full, one more per object.
+size_t expected_edge_nodes(const EdgeSamplerInput& input);
+
 // The children of a node are all nodes, or, if it has at most `width` edges, one edge
 // each.
 using ForestShape = SplitTree<kWidth>;

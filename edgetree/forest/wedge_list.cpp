@@ -73,6 +73,7 @@ std::span<const Wedge> WedgeWindow::wedges(EdgeRange range) {
   if (range.begin < range_.begin || range.end > range_.end) {
     range_ = range;
     wedges_.clear();
+    wedges_.reserve(range.size());
     for (uint32_t i = range.begin; i < range.end; ++i) wedges_.push_back(list_[i]);
   }
   return std::span<const Wedge>(wedges_).subspan(range.begin - range_.begin, range.size());

@@ -244,6 +244,17 @@ TEST(Forest, IsValidForAllMeshes) {
   }
 }
 
+// Arrays that grow hold their elements twice: of large meshes, a fifth of a run's memory.
+TEST(Forest, IsBuiltInTheRoomExpectedForIt) {
+  const Mesh large = with_smooth_normals(torus_mesh(160, 120)), small = torus_mesh(4, 3);
+  const EdgeSamplerInput input{{build_edge_mesh(large, true, ShapeId(0)),
+                                build_edge_mesh(small, true, ShapeId(1)),
+                                build_edge_mesh(large, false, ShapeId(2))}};
+  const Forest forest = build_forest(input, 1, ForestConfig{});
+  EXPECT_EQ(forest.edges.capacity(), expected_edge_nodes(input));
+  EXPECT_EQ(forest.inner.capacity(), expected_edge_nodes(input) / 2);
+}
+
 // Each change breaks one invariant, which fault_of names.
 TEST(Forest, CorruptedCopiesAreFound) {
   using Change = void (*)(Forest&);

@@ -74,7 +74,7 @@ void use_huge_pages([[maybe_unused]] char** argv) {
   constexpr const char* kName = "GLIBC_TUNABLES";
   constexpr const char* kWish =
       "glibc.malloc.hugetlb=1:glibc.malloc.mmap_threshold=33554432:"
-      "glibc.malloc.trim_threshold=268435456";
+      "glibc.malloc.trim_threshold=67108864";
   const char* wish = std::getenv(kName);
   if (wish) {
     if (std::string(wish) == kWish) unsetenv(kName);  // not for programs that this one starts
