@@ -26,6 +26,9 @@ folder = arguments[arguments.index("-o") + 1]
 name = os.path.basename(folder)
 with open(os.path.join(here, "calls"), "a") as out:
     out.write(json.dumps(arguments) + "\\n")
+if arguments[0] == "render":
+    open(folder, "w").close()
+    sys.exit(0)
 def listed(file):
     path = os.path.join(here, file)
     return os.path.exists(path) and name in open(path).read().split()
@@ -36,7 +39,8 @@ def write(status):
             json.dump(comparison(json.load(open(errors))), out)
         sys.exit(status)
     with open(os.path.join(folder, arguments[0] + ".json"), "w") as out:
-        json.dump({{"methods": [{{"name": "forest"}}, {{"name": "fd", "time_ratio": 12.5, "time_ratio_stderr": 0.5}}],
+        json.dump({{"snapshots": [{{"step": step, "meshes": [{{"chamfer": chamfer}}]}} for step, chamfer in ((0, 0.5), (40, 0.25))],
+                    "methods": [{{"name": "forest"}}, {{"name": "fd", "time_ratio": 12.5, "time_ratio_stderr": 0.5}}],
                     "variants": [{{"name": "li2019", "hit_rate": 0.25}}]}}, out)
     sys.exit(status)
 def comparison(errors):
@@ -127,6 +131,22 @@ class TestPaper(unittest.TestCase):
         self.assertIn("12 edges, 12 of them not concave", done.stdout)
         self.paper("--figures", "--mesh", mesh, "--only", only)
         self.assertEqual(len(self.calls()), 4)
+
+    def test_the_fit_of_figure_14(self):
+        done = self.paper("--figures", "--only", "fig14-quadric")
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        target, fit, *elsewhere = self.calls()
+        self.assertEqual(target[:2], ["render", "scenes/fits/two_mirrors.xml"])
+        self.assertEqual(fit[:2], ["fit", "scenes/fits/two_mirrors_start.xml"])
+        self.assertEqual(self.value(fit, "--target"), self.value(target, "-o"))
+        self.assertEqual(self.value(fit, "--method"), "quadric")
+        truth = "mesh=" + os.path.join(os.path.realpath(ROOT), self.value(fit, "--truth"))
+        self.assertIn(truth, target)
+        self.assertEqual([self.value(call, "-o") for call in elsewhere],
+                         [self.path("out", "fig14-quadric", f"elsewhere_{name}.exr") for name in ("00000", "00040", "target")])
+        self.assertIn("mesh=" + self.path("out", "fig14-quadric", "step_00040_object.ply"), elsewhere[1])
+        self.assertIn(truth, elsewhere[2])
+        self.assertIn("chamfer 0.25 of the diagonal", done.stdout)
 
     def ablations(self, *arguments):
         command = [word for word in self.command("--ablations", *arguments) if word != "--no-report"]

@@ -253,6 +253,7 @@ def fitting(folder, status="done"):
             "views": [view, view],
             "parameters": ["ball.vertex_positions", "clay.reflectance"],
             "loss": "l2",
+            "method": "adaptive",
             "optimiser": "adam-uniform",
             "steps": 45,
         },

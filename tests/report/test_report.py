@@ -10,9 +10,11 @@ import tempfile
 import unittest
 
 from needs import need_matplotlib
-from sample_folders import fitting, rejection, write_samples
+from sample_folders import fitting, rejection, write_png, write_samples
 
 need_matplotlib()
+import numpy as np  # noqa: E402
+
 TOOLS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "tools")
 REPORT = os.path.join(TOOLS, "report.py")
 sys.path.insert(0, TOOLS)
@@ -283,6 +285,22 @@ class TestReport(unittest.TestCase):
 
 class TestFigures(unittest.TestCase):
     """The page of tools/paper --figures."""
+
+    def test_a_fit_is_shown_in_two_scenes(self):
+        with tempfile.TemporaryDirectory(prefix="limn_figures_") as folder:
+            fitting(folder)
+            for name in [*(f"{step:05}" for step in range(0, 50, 5)), "target"]:
+                write_png(os.path.join(folder, f"elsewhere_{name}.png"), np.full((4, 4, 3), 0.5))
+            figures = [Figure("Fig. 6", "A fit", "a", "b", [Part("fit", "fit", "room.xml")])]
+            file = os.path.join(folder, "figures.html")
+            missing = figure_page.write(file, figures, lambda part: folder, ["tools/paper", "--figures"])
+            with open(file, encoding="utf-8") as stream:
+                page = stream.read()
+        self.assertEqual(missing, 0)
+        self.assertNotIn("Picture missing", page)
+        self.assertEqual(page.count("data:image/png;base64,"), 2 * 11)
+        self.assertIn("<h3>adaptive: limn&#x27;s default</h3>", page)
+        self.assertIn("45</td><td>0.00217</td>", page)
 
     def test_a_figure_has_its_words_pictures_and_commands(self):
         with tempfile.TemporaryDirectory(prefix="limn_figures_") as temporary:

@@ -127,6 +127,21 @@ FIGURES = [
         table="samples",
     ),
     Figure(
+        "Figure 14",
+        "A shape before two mirrors",
+        "A shape from one image of it and of its two reflections, by gradient descent over "
+        "reparameterised vertices (Nicolet et al. 2021) with remeshing, shown in the scene and under "
+        "other lights. No numbers.",
+        "Six samples per pixel, 64 x 32 pixels, remeshed three times. The second row is a view and a "
+        "light that no fit has used; its last picture is the truth. Longer fits: "
+        "scenes/fits/README.md.",
+        [Part(f"fig14-{method}", "fit", "scenes/fits/two_mirrors_start.xml", "object.vertex_positions",
+              [method], {"width": "64", "height": "32"},
+              options=["--spp", "6", "--steps", "120", "--remesh", "30,60,90", "--snapshots", "40",
+                       "--step", "2", "--smoothing", "0.1"])
+         for method in (PAPER, DEFAULT, LI2019)],
+    ),
+    Figure(
         "Figure 15",
         "The chandelier",
         "An intricate object in a mirror: after as many samples the noise is larger by orders of "

@@ -10,6 +10,7 @@ from report import charts
 from report.colours import Palette
 from report.comparison import (BIAS, EQUAL_ERROR, ERRORS, SECONDS, ComparisonSection, finished,
                                longest, time_ratios)
+from report.fitting import FitSection
 from report.markup import (Markup, command, count, document, element, figures, hint, join, notice,
                            percent, table, times)
 from report.page import bias_threshold, palette_of
@@ -81,6 +82,26 @@ def _best(ratios):
     spread = {n: error / ratio for n, (ratio, error) in ratios.items()}
     return [n for n in ranking if math.log(ratios[n][0] / ratios[ranking[0]][0])
             <= 2 * math.hypot(spread[n], spread[ranking[0]])]
+
+
+def _fit(result, group, palette):
+    """The pictures of a fit, over what it found elsewhere, and how far it is from the truth."""
+    section = FitSection(result, group, palette)
+    method = section.arguments.text("method")
+    steps = [(f"step {s.number('step')}", f"{s.number('step'):05}", s.values["pictures"][0])
+             for s in section.snapshots]
+    steps.append(("target", "target", section.data.values["targets"][0]))
+    cards = [section.card(head, section.figure(picture, head, "the scene"),
+                          section.figure(f"elsewhere_{name}.png", f"{head}, elsewhere", "elsewhere"))
+             for head, name, picture in steps]
+    (step, last), first = section.meshes[-1], section.meshes[0][1]
+    rows = [[mesh.text("shape"), count(at), figures(mesh.number("chamfer")),
+             figures(mesh.number("hausdorff_95")), f"{figures(mesh.number('normal_angle'))}°"]
+            for at, mesh in ((0, first), (step, last))]
+    html = join(element("h3", ": ".join([method, *([ROLES[method]] if method in ROLES else [])])), section.gallery(cards, wide=True),
+                table(["shape", "steps", "chamfer over diagonal", "Hausdorff 95 %", "normals"], rows,
+                      f"Distance to the truth, {method}"))
+    return html, f"{method}: chamfer {figures(last.number('chamfer'))}"
 
 
 def _rejection(result, group, palette):
@@ -214,7 +235,7 @@ class _Page:
     def __init__(self, paper_figures, folder, again):
         self.figures, self.folder, self.again = paper_figures, folder, again
         self.results = {}
-        for part in (p for f in paper_figures for p in f.runs if p.kind in ("compare", "reject")):
+        for part in (p for f in paper_figures for p in f.runs if p.kind in ("compare", "reject", "fit")):
             try:
                 self.results[part.name] = read_folder(folder(part))[0]
             except ReportError:
@@ -235,8 +256,9 @@ class _Page:
             result, group = self.results.get(part.name), f"{identifier}-{part.name}"
             if result is None:
                 continue
-            if result.kind == "reject":
-                shown = _rejection(result, group, self.palette)
+            if result.kind in ("reject", "fit"):
+                show = _rejection if result.kind == "reject" else _fit
+                shown = show(result, group, self.palette)
             else:
                 *shown, factor, style = _comparison(result, part, entry.table,
                                                     group.replace(".", "-"), self.palette,
