@@ -363,8 +363,7 @@ Rgb<double> LineLight::map_light(const Receiver& receiver, double offset) const 
     const double along = dot(receiver.n, grid.pole), across = dot(receiver.n, r);
     const auto up_to = [&](const Azimuth& end) {
       const double c = end.c * turned;
-      return columns_->sum(meridian,
-                           columns_->weights(std::atan2(end.s, c), c, end.s, along, across));
+      return columns_->up_to(meridian, std::atan2(end.s, c), c, end.s, along, across);
     };
     return (up_to(to) - up_to(from)) * turned;
   };

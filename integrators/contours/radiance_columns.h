@@ -1,80 +1,109 @@
 #pragma once
 // Integrals of an environment map along its meridians, summed from the pole on: what a piece of a
 // line sends is a difference of two of them, however many texels it passes.
+#include <algorithm>
+#include <array>
+#include <cstdint>
 #include <functional>
+#include <memory>
+#include <span>
 #include <vector>
 
 #include "limn/core/environment.h"
+#include "limn/core/huge_pages.h"
 
 namespace limn {
 
 class RadianceColumns {
  public:
-  // The environment must have a grid; nothing is kept of it. Three colours for every texel:
-  // InputError if memory does not hold them.
+  // radiance(column, row) at the grid's points and at places between its rows; nothing is kept of
+  // it. 64 bytes for every texel: InputError if memory does not hold them.
+  using Lookup = std::function<Rgb<double>(int, double)>;
+  RadianceColumns(const Environment::Grid& grid, const Lookup& radiance, int threads);
+  // Of an environment that has a grid.
   RadianceColumns(const Environment& environment, int threads);
 
   const Environment::Grid& grid() const { return grid_; }
   // How bright the map is around each column, from the azimuth of `zero` on towards `quarter`.
   std::vector<double> brightness() const;
 
+  // Where a meridian is: between a column and the next, which has this share.
   struct Meridian {
-    size_t first, second;  // of the columns around it, the beginning of their sums
-    double share;          // of the second
+    uint32_t column;
+    float share;
   };
   Meridian meridian(const Vec3d& r) const;
-  Meridian meridian(double turn) const;  // azimuth from `zero` towards `quarter` [turns, 0 to 1]
+  // columns: from column 0 towards `quarter`, at least 0 and below twice their number.
+  Meridian meridian(double columns) const {
+    columns -= columns < grid_.columns ? 0 : grid_.columns;
+    const int column = std::clamp(static_cast<int>(columns), 0, grid_.columns - 1);
+    return {static_cast<uint32_t>(column), static_cast<float>(columns - column)};
+  }
 
   // With w = pole cos theta + r sin theta and n . w = along cos theta + across sin theta: the
   // integral of n . w L sin theta over theta from 0 [W / (m^2 sr) rad]. Exact for the bilinear map,
-  // in between columns and rows, too. On every meridian it is a sum with these weights:
-  struct Weights {
-    int row;               // before theta: the integrals up to there count `along` and `across`
-    double along, across;  // times
-    double here, below;    // of the texels in that row and in the next
-  };
-  Weights weights(double theta, double cos_theta, double sin_theta, double along,
-                  double across) const;
-  Rgb<double> sum(const Meridian& at, const Weights& weights) const;
+  // in between columns and rows, too, but for floats: the error is some 2^-24 of the integral of
+  // |L| there.
+  Rgb<double> up_to(const Meridian& at, double theta, double cos_theta, double sin_theta,
+                    double along, double across) const;
 
-  // Three colours, and one number of padding.
-  using Colour [[gnu::vector_size(32)]] = double;
-  // In a row of a column: radiance, and the integrals of L cos theta sin theta and L sin^2 theta up
-  // to there.
-  struct Cell {
-    Colour texel{}, pole{}, across{};
+  // Many such ends, on meridians of one point, as sums of cells.
+  struct Ends {
+    void resize(size_t size);
+    size_t count = 0;            // that are in use
+    std::vector<uint32_t> cell;  // before `weigh` a meridian's column, then the table's cell
+    std::vector<float> share;    // of the next cell
+    std::vector<float> across, sign;
+    // Of a cell's four colours, with the sign.
+    struct alignas(16) Weights {
+      float of[4];
+    };
+    std::vector<Weights> weights;
   };
-  // Reverse mode: adds dLoss/dsum to the derivatives for cells, of which
-  // `finish` calls add(w, dLoss/dL) for each direction w whose radiance was looked up.
-  using Adjoint = std::vector<Cell>;
-  Adjoint zero_adjoint() const { return Adjoint(cells_.size()); }
-  static void add(const Meridian& at, const Weights& weights, const Rgb<double>& d_sum,
-                  Adjoint& adjoint);
+  // Sets the weights. theta: angles but for their signs, as many as there are ends.
+  void weigh(std::span<const float> theta, float along, Ends& ends) const;
+  // One end, whose sum is the radiance itself.
+  void look(const Meridian& at, double theta, Ends& ends) const;
+  Rgb<double> sum(const Ends& ends) const;
+
+  // Reverse mode: adds dLoss/dsum to the derivatives for cells, of which `finish` calls
+  // add(column, row, dLoss/dL) for all that was looked up.
+  using Colour [[gnu::vector_size(32)]] = double;  // three, and padding
+  using Adjoint = HugePageVector<std::array<Colour, 4>>;
+  Adjoint zero_adjoint() const { return Adjoint(rows_ * stride_); }
+  static void add(const Ends& ends, const Rgb<double>& d_sum, Adjoint& adjoint);
   void finish(Adjoint adjoint,
-              const std::function<void(const Vec3d&, const Rgb<double>&)>& add) const;
+              const std::function<void(int, double, const Rgb<double>&)>& add) const;
 
  private:
-  struct Moments {
-    double pole, across;                // of 1
-    double pole_linear, across_linear;  // of theta
+  // Four colours, each with a number of padding, in one line of the cache: the integrals of
+  // L cos theta sin theta and of L sin^2 theta up to a row, radiance there and in the next row.
+  using Pair [[gnu::vector_size(32)]] = float;
+  struct alignas(64) Cell {
+    Pair integrals, radiance;
   };
-  static Moments moments(double theta, double c, double s);
-  // Weights, in the integrals from a row on, of the texels of that row (here) and the next (below).
+  // In the integral over a part of a row, the weights of radiance in that row and in the next.
+  template <class T>
   struct InRow {
-    double pole_here, pole_below, across_here, across_below;
+    T here, below;
   };
-  InRow in_row(int row, const Moments& end) const;
-  void add_up(Cell* column) const;  // from its texels
-  Vec3d azimuth(int column) const;
-  Vec3d direction(int column, int row) const;
+  template <class T>
+  static InRow<T> in_row(T t, T sine2, T cosine2, T along, T across, T per_step);
+  void fill(const Lookup& radiance, int first, int last);
 
   Environment::Grid grid_;
+  int finer_;  // rows here for one of the map
+  int rows_;
   double step_, per_step_;  // between rows [rad], and its inverse
-  // Cells from one column to the next. Of a power of two, cells of one row would share few places
-  // in caches.
-  size_t stride_;
-  std::vector<Cell> cells_;  // columns by rows, and what fills up the stride
-  std::vector<Moments> at_rows_;
+  size_t stride_;           // of rows: their last column is the first again
+  struct Free {
+    void operator()(Cell* cells) const { HugePageAllocator<Cell>().deallocate(cells, 0); }
+  };
+  std::unique_ptr<Cell[], Free> cells_;
+  struct Row {
+    InRow<double> pole, across;
+  };
+  std::vector<Row> whole_;
 };
 
 }  // namespace limn

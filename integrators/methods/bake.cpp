@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <cmath>
 #include <cstring>
@@ -102,26 +101,25 @@ const char* take(const char* from, size_t count, std::vector<T>& numbers) {
   return from + count * sizeof(T);
 }
 
-// Cosines and sines of angles from 0 to pi, to 1e-11, many at once: Taylor's sums around pi / 2.
-void turn_angles(std::span<const float> angles, double* cosines, double* sines) {
-  constexpr int kTerms = 8;
-  constexpr auto kInverses = [] {  // of factorials, with the signs of cos (even) and sin (odd)
-    std::array<double, 2 * kTerms> inverses{1, 1};
-    for (size_t i = 2; i < inverses.size(); ++i) {
-      inverses[i] = -inverses[i - 2] / static_cast<double>(i * (i - 1));
-    }
-    return inverses;
-  }();
-  for (size_t i = 0; i < angles.size(); ++i) {
-    const double y = std::fabs(double{angles[i]}) - kPi / 2, y2 = y * y;
-    double cosine = 0, sine = 0;
-    for (int k = 2 * kTerms - 2; k >= 0; k -= 2) {
-      cosine = cosine * y2 + kInverses[k];
-      sine = sine * y2 + kInverses[k + 1];
-    }
-    cosines[i] = -y * sine;
-    sines[i] = cosine;
+// visit(texel, weight) for the texels of a column that make up the map between two rows.
+template <class Visit>
+void for_texels(const Image& texels, int column, double row, const Visit& visit) {
+  const int first = std::min(static_cast<int>(row), texels.height - 1);
+  const int next = std::min(first + 1, texels.height - 1);
+  const auto at = [&](int y) { return static_cast<size_t>(y) * texels.width + column; };
+  visit(at(first), 1 - (row - first));
+  if (row > first) visit(at(next), row - first);
+}
+
+// A map of one row is the same all the way down.
+Environment::Grid grid_of(const SkyMap& map) {
+  check_finite(map.texels, "", "the map");
+  if (!std::isfinite(map.scale) || !std::isfinite(map.turn)) {
+    throw InputError("the map's scale and rotation must be finite");
   }
+  Environment::Grid grid = upright_grid();
+  grid.columns = map.texels.width, grid.rows = std::max(2, map.texels.height);
+  return grid;
 }
 
 }  // namespace
@@ -239,59 +237,97 @@ void BakedView::check_scene(const Scene& scene) const {
 
 // A map as sums over its columns, and where the azimuth 0 of records lies in it.
 struct BakedView::Columns {
-  Columns(const SkyMap& map, int lines, int threads)
-      : sky((check(map), make_map_environment(map.texels, map.scale, map.turn, "a map"))),
-        columns(*sky, threads),
-        turn(map.turn / 360 - std::floor(map.turn / 360)) {
-    for (int j = 0; j < lines; ++j) {
-      const double psi = 2 * kPi * j / lines;
-      around.push_back({std::cos(psi), std::sin(psi)});
-    }
+  Columns(const SkyMap& map, int lines, int threads);
+  // Column of an azimuth of records, as RadianceColumns::meridian takes it.
+  double column(double turns) const {
+    const double columns = (turns + turn) * sums.grid().columns - 0.5;
+    return columns < 0 ? columns + sums.grid().columns : columns;
   }
-  static void check(const SkyMap& map) {
-    check_finite(map.texels, "", "the map");
-    if (std::isfinite(map.scale) && std::isfinite(map.turn)) return;
-    throw InputError("the map's scale and rotation must be finite");
-  }
-  std::shared_ptr<Environment> sky;
-  RadianceColumns columns;
+  // What a point looks straight into, and the ends of a point's ranges.
+  void look(const Vec3d& w, RadianceColumns::Ends& ends) const;
+  void weigh(const SkyRecord::Point& point, std::span<const float> angles,
+             RadianceColumns::Ends& ends) const;
+
+  RadianceColumns sums;
   double turn;
-  std::vector<std::array<double, 2>> around;  // cosine and sine of the azimuths with offset 0
+  std::vector<float> cosines, sines;  // of the lines' azimuths with offset 0
 };
 
-// Light of a pixel from the map is the sum of view(scale, direction), scale times the radiance from
-// there, and of end(scale, meridian, weights), scale times RadianceColumns::sum.
-template <class View, class End>
-void BakedView::walk(size_t pixel, const Columns& map, const View& view, const End& end) const {
-  static thread_local std::vector<double> cosines, sines;
-  const std::span<const float> all(numbers_);
-  const auto visit = [&](const SkyRecord::Point& point, std::span<const float> angles) {
-    if (point.is_view()) return view(point.scale, point.w);
-    cosines.resize(std::max(cosines.size(), angles.size()));
-    sines.resize(cosines.size());
-    turn_angles(angles, cosines.data(), sines.data());
-    const Rgb<double> scales[] = {point.scale * (2 * kPi / lines_),
-                                  point.scale * (-2 * kPi / lines_)};
-    const double psi = 2 * kPi * point.offset / lines_;
-    const double x = point.w.x * std::cos(psi) + point.w.z * std::sin(psi);
-    const double z = point.w.x * std::sin(psi) - point.w.z * std::cos(psi);
-    size_t first = 0;
-    for (int j = 0; j < lines_; ++j) {
-      const auto [c, s] = map.around[j];
-      const double across = x * s + z * c;
-      const double turn = (j + point.offset) / lines_ + map.turn;
-      const RadianceColumns::Meridian meridian = map.columns.meridian(turn < 1 ? turn : turn - 1);
-      size_t last = first;
-      while (!std::signbit(angles[last])) ++last;
-      for (size_t i = first; i <= last; ++i) {
-        end(scales[(last - i) % 2], meridian,
-            map.columns.weights(std::fabs(angles[i]), cosines[i], sines[i], point.w.y, across));
-      }
-      first = last + 1;
-    }
+BakedView::Columns::Columns(const SkyMap& map, int lines, int threads)
+    : sums(
+          grid_of(map),
+          [&](int column, double row) {
+            const Image& texels = map.texels;
+            Rgb<double> radiance;
+            for_texels(texels, column, row, [&](size_t texel, double weight) {
+              const float* x = &texels.data[texel * texels.channels];
+              const size_t g = texels.channels == 3 ? 1 : 0;
+              radiance += Rgb<double>{x[0], x[g], x[2 * g]} * (weight * map.scale);
+            });
+            return radiance;
+          },
+          threads),
+      turn(map.turn / 360 - std::floor(map.turn / 360)) {
+  for (int j = 0; j < lines; ++j) {
+    const double psi = 2 * kPi * j / lines;
+    cosines.push_back(static_cast<float>(std::cos(psi)));
+    sines.push_back(static_cast<float>(std::sin(psi)));
+  }
+}
+
+void BakedView::Columns::look(const Vec3d& w, RadianceColumns::Ends& ends) const {
+  const double turns = std::atan2(w.x, -w.z) / (2 * kPi);
+  sums.look(sums.meridian(column(turns < 0 ? turns + 1 : turns)),
+            std::atan2(std::hypot(w.x, w.z), w.y), ends);
+}
+
+void BakedView::Columns::weigh(const SkyRecord::Point& point, std::span<const float> angles,
+                               RadianceColumns::Ends& ends) const {
+  struct Line {
+    RadianceColumns::Meridian meridian;
+    float across;
   };
-  SkyRecord::for_each(all.subspan(starts_[pixel], starts_[pixel + 1] - starts_[pixel]), lines_,
-                      visit);
+  static thread_local std::vector<Line> lines;
+  const size_t count = cosines.size();
+  lines.resize(count);
+  const double per_line = 1 / static_cast<double>(count), psi = 2 * kPi * point.offset * per_line;
+  const auto x = static_cast<float>(point.w.x * std::cos(psi) + point.w.z * std::sin(psi));
+  const auto z = static_cast<float>(point.w.x * std::sin(psi) - point.w.z * std::cos(psi));
+  const double first = column(point.offset * per_line), apart = sums.grid().columns * per_line;
+  for (size_t j = 0; j < count; ++j) {
+    lines[j] = {sums.meridian(first + apart * static_cast<double>(j)),
+                x * sines[j] + z * cosines[j]};
+  }
+  ends.resize(angles.size());
+  // The last end of each line has its sign bit, and is added; the others take turns.
+  float sign = 1;
+  for (size_t i = angles.size(), j = count; i-- > 0;) {
+    const bool last = std::signbit(angles[i]);
+    sign = last ? 1 : -sign;
+    j -= last;
+    ends.cell[i] = lines[j].meridian.column;
+    ends.share[i] = lines[j].meridian.share;
+    ends.across[i] = lines[j].across;
+    ends.sign[i] = sign;
+  }
+  sums.weigh(angles, static_cast<float>(point.w.y), ends);
+}
+
+// Light of a pixel from the map is the sum of point(scale, ends), scale times RadianceColumns::sum.
+template <class Point>
+void BakedView::walk(size_t pixel, const Columns& map, const Point& point) const {
+  static thread_local RadianceColumns::Ends ends;
+  const auto visit = [&](const SkyRecord::Point& at, std::span<const float> angles) {
+    if (at.is_view()) {
+      map.look(at.w, ends);
+    } else {
+      map.weigh(at, angles, ends);
+    }
+    point(at.is_view() ? at.scale : at.scale * (2 * kPi / lines_), ends);
+  };
+  SkyRecord::for_each(
+      std::span(numbers_).subspan(starts_[pixel], starts_[pixel + 1] - starts_[pixel]), lines_,
+      visit);
 }
 
 Image BakedView::relight(const SkyMap& sky, int threads) const {
@@ -300,12 +336,9 @@ Image BakedView::relight(const SkyMap& sky, int threads) const {
   parallel_for(height_, threads, [&](size_t y) {
     for (size_t pixel = y * width_; pixel < (y + 1) * width_; ++pixel) {
       Rgb<double> sum{constant_[3 * pixel], constant_[3 * pixel + 1], constant_[3 * pixel + 2]};
-      walk(
-          pixel, map,
-          [&](const Rgb<double>& scale, const Vec3d& w) { sum += map.sky->radiance(w) * scale; },
-          [&](const Rgb<double>& scale, const auto& meridian, const auto& weights) {
-            sum += map.columns.sum(meridian, weights) * scale;
-          });
+      walk(pixel, map, [&](const Rgb<double>& scale, const RadianceColumns::Ends& ends) {
+        sum += map.sums.sum(ends) * scale;
+      });
       for (int c = 0; c < 3; ++c) image.data[3 * pixel + c] = static_cast<float>(sum[c]);
     }
   });
@@ -319,28 +352,23 @@ Image BakedView::texel_adjoint(const SkyMap& sky, const Image& adjoint) const {
   }
   check_finite(adjoint, "", "the adjoint image");
   const Columns map(sky, lines_, 1);
-  const Image& texels = sky.texels;
-  std::vector<double> sums(static_cast<size_t>(texels.width) * texels.height * 3);
-  const auto add = [&](const Vec3d& w, const Rgb<double>& d) {
-    for (const auto& [texel, weight] : map.sky->texel_weights(w)) {
-      // A map of one row is stored as two equal rows.
-      const size_t at = 3 * texel % sums.size();
-      for (int c = 0; c < 3; ++c) sums[at + c] += d[c] * weight;
-    }
-  };
-  RadianceColumns::Adjoint columns = map.columns.zero_adjoint();
+  RadianceColumns::Adjoint cells = map.sums.zero_adjoint();
   for (size_t pixel = 0; pixel < static_cast<size_t>(width_) * height_; ++pixel) {
     const auto channel = [&](int c) {
       return double{adjoint.data[pixel * adjoint.channels + (adjoint.channels == 3 ? c : 0)]};
     };
     const Rgb<double> d{channel(0), channel(1), channel(2)};
-    walk(
-        pixel, map, [&](const Rgb<double>& scale, const Vec3d& w) { add(w, d * scale); },
-        [&](const Rgb<double>& scale, const auto& meridian, const auto& weights) {
-          RadianceColumns::add(meridian, weights, d * scale, columns);
-        });
+    walk(pixel, map, [&](const Rgb<double>& scale, const RadianceColumns::Ends& ends) {
+      RadianceColumns::add(ends, d * scale, cells);
+    });
   }
-  map.columns.finish(std::move(columns), add);
+  const Image& texels = sky.texels;
+  std::vector<double> sums(static_cast<size_t>(texels.width) * texels.height * 3);
+  map.sums.finish(std::move(cells), [&](int column, double row, const Rgb<double>& d) {
+    for_texels(texels, column, row, [&](size_t texel, double weight) {
+      for (int c = 0; c < 3; ++c) sums[3 * texel + c] += d[c] * (weight * sky.scale);
+    });
+  });
   Image result(texels.width, texels.height, 3);
   for (size_t i = 0; i < sums.size(); ++i) result.data[i] = static_cast<float>(sums[i]);
   return result;

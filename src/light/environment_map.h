@@ -9,11 +9,11 @@
 
 #include "limn/core/dual.h"
 #include "limn/core/environment.h"
+#include "limn/core/huge_pages.h"
 #include "limn/core/image.h"
 #include "limn/core/vec.h"
 #include "src/base/angles.h"
 #include "src/base/half.h"
-#include "src/base/huge_pages.h"
 #include "src/light/map_density.h"
 
 namespace limn {

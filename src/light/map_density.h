@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
+#include "limn/core/huge_pages.h"
 #include "limn/core/prefetch.h"
-#include "src/base/huge_pages.h"
 #include "src/base/wide.h"
 
 namespace limn {

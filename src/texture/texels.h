@@ -5,11 +5,11 @@
 #include <variant>
 #include <vector>
 
+#include "limn/core/huge_pages.h"
 #include "limn/core/image.h"
 #include "limn/core/prefetch.h"
 #include "limn/core/vec.h"
 #include "src/base/half.h"
-#include "src/base/huge_pages.h"
 
 namespace limn {
 

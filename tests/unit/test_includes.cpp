@@ -142,6 +142,7 @@ TEST(Includes, NothingRunsBackUpBetweenRooms) {
 // contracts up to the one given.
 const Strings kContracts = {"check.h",
                             "prefetch.h",
+                            "huge_pages.h",
                             "renew.h",
                             "error.h",
                             "memory.h",

@@ -10,10 +10,12 @@
 #include <vector>
 
 #include "integrators/film/pixel_regions.h"
+#include "limn/core/environment.h"
 #include "limn/core/lights.h"
 #include "limn/core/ray_tracer.h"
 #include "limn/core/shading.h"
 #include "limn/core/visible_regions.h"
+#include "limn/integrators/bake.h"
 #include "limn/integrators/methods.h"
 #include "limn/integrators/render.h"
 
@@ -316,6 +318,49 @@ void add_window_benchmarks() {
   }
 }
 
+// A view baked once, under a map of 1024 x 512 texels with a sun, and in turn the method whose
+// image it keeps. over_lines: how many times as fast relighting is; sums: the share of its time for
+// sums over the map, however large the image; apart: the largest difference over the mean [2^-24].
+void add_relight_benchmark(const std::string& name) {
+  benchmark::RegisterBenchmark(
+      ("relight/" + name).c_str(),
+      [name](benchmark::State& state) {
+        Scene scene = read_at_size(LIMN_SOURCE_DIR "/scenes/" + name, "64");
+        scene.max_depth = 2;
+        const SkyMap map{read_image(LIMN_SOURCE_DIR "/build/generated/sky_sun.exr")};
+        scene.environment = make_map_environment(map.texels, map.scale, map.turn, "map");
+        RenderOptions options;
+        options.method = "lines:azimuths=uniform";
+        const BakedView view = BakedView::make(scene, one_thread(4), options.lines).view;
+        scene.film.crop_width = scene.film.crop_height = 1;
+        const BakedView pixel = BakedView::make(scene, one_thread(1), options.lines).view;
+        scene.film.crop_width = view.width(), scene.film.crop_height = view.height();
+        double lines = 0, relit = 0, sums = 0, apart = 0, mean = 0;
+        for (auto _ : state) {
+          const ProcessorTime by_lines;
+          const Moments truth = render(scene, one_thread(4), options).radiance;
+          lines += by_lines.seconds();
+          const ProcessorTime again;
+          const Image image = view.relight(map, 1);
+          state.SetIterationTime(again.seconds());
+          relit += again.seconds();
+          const ProcessorTime hardly_any;
+          benchmark::DoNotOptimize(pixel.relight(map, 1).data[0]);
+          sums += hardly_any.seconds();
+          for (size_t i = 0; i < image.data.size(); ++i) {
+            apart = std::fmax(apart, std::fabs(image.data[i] - truth.mean(i)));
+            mean += truth.mean(i) / static_cast<double>(image.data.size() * state.max_iterations);
+          }
+        }
+        state.counters["over_lines"] = lines / relit;
+        state.counters["sums"] = sums / relit;
+        state.counters["apart"] = apart / mean * 0x1p24;
+      })
+      ->Unit(benchmark::kMillisecond)
+      ->Iterations(3)
+      ->UseManualTime();
+}
+
 int run(const std::string& file) {
   Bench bench{read_at_size(file, "128"), nullptr, {}};
   bench.tracer = make_embree_tracer(bench.scene, 1);
@@ -328,6 +373,7 @@ int run(const std::string& file) {
   add_gradient_benchmarks(bench, parameter);
   add_film_benchmark(file);
   add_window_benchmarks();
+  for (const char* name : {"sun.xml", "soft_shadow.xml", "plant.xml"}) add_relight_benchmark(name);
   benchmark::AddCustomContext("scene", file);
   benchmark::AddCustomContext("parameter", parameter);
   benchmark::RunSpecifiedBenchmarks();

@@ -57,8 +57,8 @@ class BakedView {
  private:
   struct PixelRow;
   struct Columns;
-  template <class View, class End>
-  void walk(size_t pixel, const Columns& columns, const View& view, const End& end) const;
+  template <class Point>
+  void walk(size_t pixel, const Columns& columns, const Point& point) const;
   int width_ = 0, height_ = 0, lines_ = 0;
   std::string scene_, fingerprint_;
   std::vector<float> constant_;   // height by width by 3: what does not come from the environment
