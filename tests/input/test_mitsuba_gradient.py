@@ -2,6 +2,7 @@
 is asked.
 """
 
+import json
 import os
 import subprocess
 import sys
@@ -11,7 +12,7 @@ import unittest
 
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
 TOOL = os.path.join(ROOT, "tools", "mitsuba", "mitsuba_gradient.py")
-sys.path.insert(0, os.path.dirname(TOOL))
+sys.path[:0] = [os.path.dirname(TOOL), os.path.join(ROOT, "tools")]
 import mitsuba_gradient  # noqa: E402
 
 SCENE = os.path.join(ROOT, "scenes", "closed_form", "cube_in_sky.xml")
@@ -65,6 +66,27 @@ class TestMitsubaGradient(unittest.TestCase):
                     ),
                 ),
             )
+
+    def test_an_equal_budget_without_it(self):
+        """A program in limn's place writes 1 where the reference is 3."""
+        import exr
+        import numpy as np
+
+        path = lambda name: os.path.join(self.folder.name, name)  # noqa: E731
+        for name, value in (("one.exr", 1), ("reference.exr", 3)):
+            with open(path(name), "wb") as out:
+                out.write(exr.rgb_bytes(np.full((2, 3), value)))
+        with open(path("limn"), "w") as out:
+            out.write(f'#!/bin/sh\nwhile [ "$1" != -o ]; do shift; done\ncp {path("one.exr")} "$2"\n')
+        os.chmod(path("limn"), 0o755)
+        tool = os.path.join(os.path.dirname(TOOL), "equal_budget.py")
+        subprocess.run([sys.executable, tool, SCENE, "--wrt", "object.scale", "--methods", "quadric", "--limn", path("limn"),
+                        "--reference", path("reference.exr"), "-o", self.folder.name],
+                       check=True, env={**os.environ, "PYTHONPATH": self.folder.name})
+        with open(path("budget.json")) as stream:
+            told = json.load(stream)
+        self.assertEqual(told["rows"], [{"name": "quadric", "spp": 128, "trials": 0, "leaves": 0, "mse": 4.0}])
+        self.assertIn("pip install mitsuba==3.9.1", told["missing"])
 
     def test_arguments(self):
         for arguments, message in (

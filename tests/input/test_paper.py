@@ -11,6 +11,7 @@ import sys
 import tempfile
 import time
 import unittest
+from unittest import mock
 
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
 PAPER = os.path.join(ROOT, "tools", "paper")
@@ -38,8 +39,9 @@ def write(status):
         with open(os.path.join(folder, "compare.json"), "w") as out:
             json.dump(comparison(json.load(open(errors))), out)
         sys.exit(status)
-    with open(os.path.join(folder, arguments[0] + ".json"), "w") as out:
-        json.dump({{"snapshots": [{{"step": step, "meshes": [{{"chamfer": chamfer}}]}} for step, chamfer in ((0, 0.5), (40, 0.25))],
+    kind = "budget" if "budget" in arguments[0] else arguments[0]
+    with open(os.path.join(folder, kind + ".json"), "w") as out:
+        json.dump({{"rows": [{{"name": "quadric", "mse": 0.125}}], "snapshots": [{{"step": step, "meshes": [{{"chamfer": chamfer}}]}} for step, chamfer in ((0, 0.5), (40, 0.25))],
                     "methods": [{{"name": "forest"}}, {{"name": "fd", "time_ratio": 12.5, "time_ratio_stderr": 0.5}}],
                     "variants": [{{"name": "li2019", "hit_rate": 0.25}}]}}, out)
     sys.exit(status)
@@ -131,6 +133,20 @@ class TestPaper(unittest.TestCase):
         self.assertIn("12 edges, 12 of them not concave", done.stdout)
         self.paper("--figures", "--mesh", mesh, "--only", only)
         self.assertEqual(len(self.calls()), 4)
+
+    def test_the_equal_budget_of_figure_11(self):
+        os.makedirs(self.path("out", "meshes"))
+        self.write(os.path.join("out", "meshes", "creature_8000.ply"), "")
+        with mock.patch.dict(os.environ, LIMN_MITSUBA_PYTHON=self.limn):
+            done = self.paper("--figures", "--only", "fig11,fig11-budget")
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        timed, budget = self.calls()
+        self.assertEqual(budget[:2], ["tools/mitsuba/equal_budget.py", "scenes/rough_mirror.xml"])
+        self.assertEqual(self.value(budget, "--methods"), "quadric,adaptive")
+        self.assertEqual(self.value(budget, "--reference"), os.path.join(self.value(timed, "-o"), "reference.exr"))
+        defined = [[w for w in call if "=" in w] for call in (timed, budget)]
+        self.assertEqual(*defined)
+        self.assertIn("squared errors: quadric 0.125", done.stdout)
 
     def test_the_fit_of_figure_14(self):
         done = self.paper("--figures", "--only", "fig14-quadric")

@@ -302,6 +302,21 @@ class TestFigures(unittest.TestCase):
         self.assertIn("<h3>adaptive: limn&#x27;s default</h3>", page)
         self.assertIn("45</td><td>0.00217</td>", page)
 
+    def test_a_budget_has_a_row_for_every_share(self):
+        with tempfile.TemporaryDirectory(prefix="limn_figures_") as folder:
+            rows = [{"name": "quadric", "spp": 128, "trials": 0, "leaves": 0, "mse": 0.5}]
+            rows += [{"name": "mitsuba", "spp": n, "trials": 6, "leaves": 84000, "mse": 25 / n} for n in (32, 64)]
+            with open(os.path.join(folder, "budget.json"), "w") as stream:
+                json.dump({"spp": 128, "rows": rows, "missing": ""}, stream)
+            file = os.path.join(folder, "figures.html")
+            figures = [Figure("Fig. 6", "A budget", "a", "b", [Part("x", "budget", "room.xml")])]
+            self.assertEqual(figure_page.write(file, figures, lambda part: folder, ["tools/paper"]), 0)
+            with open(file, encoding="utf-8") as stream:
+                page = stream.read()
+        self.assertIn("<td>32</td><td>84 k</td><td>6</td><td>0.781</td>", page)
+        self.assertEqual(page.count('class="best"'), 1)
+        self.assertIn("squared error by an equal budget: quadric 0.500, mitsuba 0.391", page)
+
     def test_a_figure_has_its_words_pictures_and_commands(self):
         with tempfile.TemporaryDirectory(prefix="limn_figures_") as temporary:
             mirror, _, bunny = write_samples(os.path.join(temporary, "runs"))

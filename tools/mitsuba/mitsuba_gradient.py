@@ -228,13 +228,13 @@ class Renderer:
         defines = dict(arguments.D)
         try:
             settings = path_settings(mi, arguments.scene, defines)
-            self._scene = mi.load_file(arguments.scene, optimize=False, **defines)
+            self.scene = mi.load_file(arguments.scene, optimize=False, **defines)
         except Exception as error:
             raise Failure(BAD_INPUT, f"{arguments.scene}: {error}") from None
         if arguments.threads:
             dr.set_thread_count(arguments.threads)  # With one thread loading waits for itself, too.
-        self._motion = Motion(mi, dr, self._scene, arguments.wrt)
-        width, height = self._scene.sensors()[0].film().crop_size()
+        self.motion = Motion(mi, dr, self.scene, arguments.wrt)
+        width, height = self.scene.sensors()[0].film().crop_size()
         # A power of two: other counts need other kernels.
         self._spp = 1 << max(0, (PASS_SAMPLES // (width * height)).bit_length() - 1)
         if arguments.spp:
@@ -246,7 +246,7 @@ class Renderer:
     def _pass(self, term):
         self._seed += 1
         start = self._clock.seconds()
-        image = term.estimate(self._scene, self._motion, self._seed % 2**32, self._spp)
+        image = term.estimate(self.scene, self.motion, self._seed % 2**32, self._spp)
         term.pass_seconds = self._clock.seconds() - start
         term.seconds += term.pass_seconds
         return image

@@ -181,6 +181,27 @@ def _draws(record):
     return html, f"rays a draw, {edges} edges: {', '.join(shown)}"
 
 
+def _budget(record):
+    """limn's methods, and every share of the budget that Mitsuba's image had."""
+    rows = record.records("rows")
+    base = next(r.number("mse") for r in rows if r.text("name") == PAPER)
+    least = {name: min(r.number("mse") for r in rows if r.text("name") == name)
+             for name in {r.text("name"): 0 for r in rows}}
+    shown = [[join(r.text("name"), element("span", ROLES.get(r.text("name"), ""), class_="role")),
+              str(r.number("spp")), *([count(r.number("leaves")), str(r.number("trials"))]
+                                      if r.number("trials") else ["–", "–"]),
+              figures(r.number("mse")),
+              element("td", times(r.number("mse") / base),
+                      class_="best" if r.number("mse") == min(least.values()) else None)] for r in rows]
+    head = ["method", "spp of the image", "leaves", "trials each", "mean squared error",
+            f"over {PAPER}"]
+    missing = record.text("missing", "")
+    html = join(element("h3", f"An equal budget: {count(record.number('spp'))} samples per pixel"),
+                notice("", missing) if missing else None, table(head, shown, "Equal budget"))
+    words = ", ".join(f"{name} {figures(error)}" for name, error in least.items())
+    return html, f"squared error by an equal budget: {words}"
+
+
 def _edges(records):
     """All meshes of a figure in one table."""
     counts = [(r, r.number("edges"), r.number("without_concave")) for r in records]
@@ -268,6 +289,7 @@ class _Page:
             parts.append(shown[0])
             verdicts.append(shown[1])
         drawn = [_draws(record) for record in self._records(entry, "draws")]
+        drawn += [_budget(record) for record in self._records(entry, "budget")]
         counted = self._records(entry, "edges")
         drawn += [_edges(counted)] if counted else []
         warped = self._records(entry, "gradient")

@@ -26,10 +26,11 @@ UP, ASIDE, TURN, CAMERA = ("object.translate.y", "object.translate.x", "object.r
 @dataclass
 class Part:
     """One run: a call of limn or of edge_benchmark, or a count of edges. A fit's input starts from a
-    sphere; its target is a rendering of the scene of that name without _start."""
+    sphere; its target is a rendering of the scene of that name without _start. A budget has the
+    reference of another part."""
 
     name: str
-    kind: str  # "compare", "gradient", "fit", "reject", "draws" or "edges"
+    kind: str  # "compare", "gradient", "fit", "budget", "reject", "draws" or "edges"
     input: str  # scene; for the last three a mesh may stand here
     parameter: str = ""
     methods: list = field(default_factory=list)
