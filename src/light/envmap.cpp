@@ -3,6 +3,7 @@
 
 #include "limn/core/check.h"
 #include "limn/core/environment.h"
+#include "limn/core/mis_compensation.h"
 #include "src/light/environment_map.h"
 #include "src/light/types.h"
 
@@ -30,11 +31,11 @@ class MapEnvironment final : public Environment {
   void sample_directions(std::span<const Numbers> u, std::span<Drawn> drawn) const override;
   double pdf_solid_angle(const Vec3d& d) const override {
     const Vec3d v = map_from_world(d);
-    return drawn_by_->pdf_solid_angle(map_->locate(v), v);
+    return drawn_by_->pdf_solid_angle(density(), map_->locate(v), v);
   }
   std::array<double, 2> find(const Vec3d& d) const override {
     const auto place = map_->locate(map_from_world(d));
-    map_->fetch(place);
+    map_->fetch(place, density());
     return {place.x, place.y};
   }
   void find_each(std::span<const Found> found) const override;
@@ -71,7 +72,7 @@ class MapEnvironment final : public Environment {
       const Image before = tangents->texels();
       for (size_t i = 0; i < sum.data.size(); ++i) sum.data[i] += before.data[i];
     }
-    tangents = std::make_shared<EnvironmentMap>(sum, false);
+    tangents = std::make_shared<EnvironmentMap>(sum);
     texels_move_ = true;
   }
   std::array<TexelWeight, 4> texel_weights(const Vec3d& d) const override {
@@ -85,6 +86,11 @@ class MapEnvironment final : public Environment {
   std::shared_ptr<Environment> drawn_by(const MapEnvironment& other) const {
     const auto copy = std::make_shared<MapEnvironment>(*this);
     copy->drawn_by_ = other.drawn_by_;
+    return copy;
+  }
+  std::shared_ptr<Environment> with_peaks() const {
+    const auto copy = std::make_shared<MapEnvironment>(*this);
+    copy->follows_ = EnvironmentMap::Follows::kPeaks;
     return copy;
   }
   std::string describe() const override {
@@ -102,6 +108,7 @@ class MapEnvironment final : public Environment {
   }
   static constexpr const char* kChanged = ", changed";
 
+  const MapDensity& density() const { return drawn_by_->density(follows_); }
   // Adds the derivatives with respect to texels.
   Rgb<Dual> moving(const EnvironmentMap::Point<double>& place, Rgb<Dual> radiance) const {
     if (!texels_move_) return radiance;
@@ -117,7 +124,7 @@ class MapEnvironment final : public Environment {
             Sight<S>& sight) const {
     DCHECK(is_place(d, {place.x, place.y}));
     sight.radiance = map_->radiance(place) * scale;
-    sight.pdf = drawn_by_->pdf_solid_angle(place, map_from_world(d));
+    sight.pdf = drawn_by_->pdf_solid_angle(density(), place, map_from_world(d));
   }
   // Up to rounding.
   [[maybe_unused]] bool is_place(const Vec3d& d, const std::array<double, 2>& place) const {
@@ -134,7 +141,8 @@ class MapEnvironment final : public Environment {
 
   std::shared_ptr<const EnvironmentMap> map_;
   std::shared_ptr<const EnvironmentMap> drawn_by_;  // has the density of directions
-  Vec3d axes_[3];                                   // the map's axes in world space
+  EnvironmentMap::Follows follows_ = EnvironmentMap::Follows::kRadiance;
+  Vec3d axes_[3];  // the map's axes in world space
   Dual scale_;
   std::string file_;
   bool texels_move_ = false;
@@ -146,7 +154,7 @@ void MapEnvironment::sample_directions(std::span<const Numbers> u, std::span<Dra
     const auto number = [&](int k) {
       return wide::gather([&](int i) { return u[std::min(first + i, last - 1)][k]; });
     };
-    const EnvironmentMap::Drawn map = drawn_by_->sample(number(0), number(1));
+    const EnvironmentMap::Drawn map = drawn_by_->sample(density(), number(0), number(1));
     const wide::Vec& v = map.direction;
     const wide::Vec w = axes_[0] * v.x + axes_[1] * v.y + axes_[2] * v.z;
     for (size_t i = first; i < last; ++i) {
@@ -163,7 +171,7 @@ void MapEnvironment::find_each(std::span<const Found> found) const {
     const auto place = map_->locate(map_from_world(d));
     for (size_t i = first; i < last; ++i) {
       const int k = static_cast<int>(i - first);
-      map_->fetch({place.x[k], place.y[k]});
+      map_->fetch({place.x[k], place.y[k]}, density());
       *found[i].place = {place.x[k], place.y[k]};
     }
   });
@@ -183,6 +191,11 @@ std::shared_ptr<Environment> drawn_alike(const std::shared_ptr<Environment>& mov
                                          const Environment& unmoved) {
   const auto* map = dynamic_cast<const MapEnvironment*>(moved.get());
   return map ? map->drawn_by(dynamic_cast<const MapEnvironment&>(unmoved)) : moved;
+}
+
+std::shared_ptr<Environment> mis_compensated(const std::shared_ptr<Environment>& environment) {
+  const auto* map = dynamic_cast<const MapEnvironment*>(environment.get());
+  return map ? map->with_peaks() : environment;
 }
 
 void read_envmap(Properties& properties, Scene& scene, Shape*) {

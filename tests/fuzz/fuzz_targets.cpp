@@ -199,13 +199,17 @@ void run_environment(Bytes bytes) {
     if (!std::isfinite(v)) return;  // refused by the reader of the emitter
   const EnvironmentMap map(image);
   demand(std::isfinite(map.mean_luminance()), "a mean is finite");
-  for (int first = 0; first < 16; first += wide::kWidth) {
-    const EnvironmentMap::Drawn drawn =
-        map.sample(wide::gather([&](int k) { return (first + k + 0.5) / 16; }),
-                   wide::gather([&](int k) { return (7 * (first + k) % 16 + 0.5) / 16; }));
-    for (int k = 0; k < wide::kWidth; ++k) {
-      demand(is_finite(wide::lane(drawn.direction, k)), "a direction is finite");
-      demand(drawn.pdf[k] > 0 && std::isfinite(drawn.pdf[k]), "what is drawn has a density");
+  using Follows = EnvironmentMap::Follows;
+  for (const Follows follows : {Follows::kRadiance, Follows::kPeaks}) {
+    const MapDensity& density = map.density(follows);
+    for (int first = 0; first < 16; first += wide::kWidth) {
+      const EnvironmentMap::Drawn drawn =
+          map.sample(density, wide::gather([&](int k) { return (first + k + 0.5) / 16; }),
+                     wide::gather([&](int k) { return (7 * (first + k) % 16 + 0.5) / 16; }));
+      for (int k = 0; k < wide::kWidth; ++k) {
+        demand(is_finite(wide::lane(drawn.direction, k)), "a direction is finite");
+        demand(drawn.pdf[k] > 0 && std::isfinite(drawn.pdf[k]), "what is drawn has a density");
+      }
     }
   }
 }
