@@ -163,6 +163,38 @@ TEST_P(RayTracers, TraceTogetherAsAlone) {
   EXPECT_LE(different, 3);  // by rounding, where faces meet
 }
 
+// As a camera's: a packet descends the tree as one.
+TEST_P(RayTracers, TraceSideBySideAsAlone) {
+  const double unit = GetParam();
+  const Scene scene = some_scene(unit);
+  const auto embree = make_embree_tracer(scene, 1);
+  Rng rng(8, 9, 10);
+  int hits = 0;
+  for (int round = 0; round < 1000; ++round) {
+    const Vec3d origin = random_direction(rng) * (2 * rng.uniform() * unit);
+    const Vec3d middle = random_direction(rng);
+    std::array<RayQuery, RayTracer::kTogether> queries;
+    for (RayQuery& query : queries) {
+      query.ray = {origin, normalize(middle + random_direction(rng) * 0.03)};
+    }
+    auto shadows = queries;
+    embree->closest_each(queries);
+    embree->occluded_each(shadows);
+    for (size_t i = 0; i < queries.size(); ++i) {
+      RayQuery alone = queries[i], shadow = queries[i];
+      embree->closest_each({&alone, 1});
+      embree->occluded_each({&shadow, 1});
+      ASSERT_EQ(alone.found, queries[i].found);
+      ASSERT_EQ(shadow.found, shadows[i].found);
+      hits += alone.found;
+      if (!alone.found) continue;
+      ASSERT_EQ(alone.hit.face, queries[i].hit.face);
+      ASSERT_EQ(alone.hit.t, queries[i].hit.t);
+    }
+  }
+  EXPECT_GT(hits, 1000);
+}
+
 // A face close above another hides what is above it, also where a third is far away.
 TEST(RaysTogether, StartBelowWhatIsCloseInLargeScenes) {
   Scene scene;
