@@ -40,6 +40,9 @@ Vec3<S> turned(const Vec3d& v, const Vec3<Dual>& angles) {
   for (int axis = 0; axis < 3; ++axis) {
     const int i = (axis + 1) % 3, j = (axis + 2) % 3;
     const S angle = as<S>(angles[axis]);
+    if constexpr (std::is_same_v<S, double>) {
+      if (angle == 0) continue;
+    }
     const S c = cos(angle), s = sin(angle);
     const S a = c * r[i] - s * r[j];
     r[j] = s * r[i] + c * r[j];
