@@ -6,18 +6,12 @@
 
 #include "integrators/paths/path_follow.h"
 #include "integrators/paths/path_log.h"
-#include "limn/core/mis_compensation.h"
 
 namespace limn {
 
-// The scene without normals that are interpolated in vain, and with draws of its environment that
-// leave dim light to scattering; none if it has no such normals and no map.
-static std::optional<Scene> made_for_images(const Scene& scene) {
+// The scene without normals that are interpolated in vain; none if it has no such normals.
+static std::optional<Scene> without_idle_normals(const Scene& scene) {
   std::optional<Scene> changed;
-  if (const auto drawn = mis_compensated(scene.environment); drawn != scene.environment) {
-    changed = scene;
-    changed->environment = drawn;
-  }
   for (size_t s = 0; s < scene.shapes.size(); ++s) {
     if (!has_idle_normals(scene.shapes[s].mesh)) continue;
     if (!changed) changed = scene;
@@ -28,8 +22,8 @@ static std::optional<Scene> made_for_images(const Scene& scene) {
 
 RadianceEstimator::RadianceEstimator(const Scene& scene, int threads, bool closed, Numbers numbers)
     : scene_(scene),
-      own_(made_for_images(scene)),
-      traced_(own_ ? *own_ : scene_, threads, {.closed = closed, .image = true}),
+      flat_(without_idle_normals(scene)),
+      traced_(flat_ ? *flat_ : scene_, threads, {.closed = closed, .image = true}),
       camera_(scene_.camera),
       filter_(scene_.film.filter),
       numbers_(numbers),

@@ -47,7 +47,7 @@ class RadianceEstimator final : public SampleEstimator {
                      const Rgb<double>& radiance, SampleSink& sink) const;
 
   const Scene& scene_;
-  std::optional<Scene> own_;  // with the same image, in less time; none: scene_ itself
+  std::optional<Scene> flat_;  // with the same image, in less time; none: scene_ itself
   TracedScene traced_;
   CameraView<double> camera_;
   FilterTable filter_;

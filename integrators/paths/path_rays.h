@@ -155,7 +155,7 @@ inline void PathTracer<S, Visitor>::fetch_textures(std::span<Walk* const> walks)
 // Where rays along walk.wo leave the scene, which has an environment; brings that into the cache.
 template <class S, class Visitor>
 inline void PathTracer<S, Visitor>::find_sky(std::span<Walk* const> walks) const {
-  const Environment& environment = *c_.scene.environment;
+  const Environment& environment = *c_.lights.drawn_environment();
   if (!wide_) {
     for (Walk* const walk : walks) walk->sky = environment.find(walk->wo);
     return;

@@ -5,6 +5,7 @@
 
 #include "integrators/paths/straight_way.h"
 #include "limn/core/exposure.h"
+#include "limn/core/mis_compensation.h"
 
 namespace limn {
 
@@ -22,7 +23,8 @@ TracedScene::TracedScene(const Scene& scene, int threads, const Options& options
         tracer_seconds_ = watch.seconds();
         return tracer;
       }()),
-      lights_(scene, nullptr, options.of_differences ? DrawFaces::kByArea : DrawFaces::kByLight),
+      lights_(scene, nullptr, options.of_differences ? DrawFaces::kByArea : DrawFaces::kByLight,
+              options.image ? mis_compensated(scene.environment) : nullptr),
       closed_(options.closed ? std::make_unique<ClosedLight>(scene, threads) : nullptr),
       viewpoints_(options.edges ? std::make_unique<Viewpoints>(scene) : nullptr),
       mirrored_(options.closed

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "limn/core/check.h"
 #include "limn/core/renew.h"
@@ -36,8 +37,11 @@ std::optional<LightSample> Environment::light_sample(const Drawn& drawn, double 
                      drawn.place};
 }
 
-Lights::Lights(const Scene& scene, const Lights* chosen_by, DrawFaces draw)
-    : of_shape_(scene.shapes.size()), environment_(scene.environment.get()), chosen_by_(chosen_by) {
+Lights::Lights(const Scene& scene, const Lights* chosen_by, DrawFaces draw,
+               std::shared_ptr<const Environment> environment)
+    : of_shape_(scene.shapes.size()),
+      environment_(environment ? std::move(environment) : scene.environment),
+      chosen_by_(chosen_by) {
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
     if (!scene.shapes[s].is_emitter) continue;
     area_lights_.push_back(
@@ -45,7 +49,7 @@ Lights::Lights(const Scene& scene, const Lights* chosen_by, DrawFaces draw)
     of_shape_[s] = all_.size();
     all_.push_back(area_lights_.back().get());
   }
-  if (environment_) all_.push_back(environment_);
+  if (environment_) all_.push_back(environment_.get());
   for (const auto& light : scene.delta_lights) all_.push_back(light.get());
   of_any_ = 1 / static_cast<double>(std::max<size_t>(1, all_.size()));
   for (const auto& light : area_lights_) reaches_.push_back(reach_of(*light));

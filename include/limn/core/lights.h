@@ -21,12 +21,17 @@ class Lights {
   // drawn by area; null: its own. Finite differences use the same choice in both scenes. Otherwise
   // another light or face would be chosen in a few samples, whose large contributions, divided by
   // the step, would carry all of that derivative (high variance). They must outlive it.
+  // environment: drawn in place of the scene's, with the same radiance (mis_compensation.h); null:
+  // the scene's.
   explicit Lights(const Scene& scene, const Lights* chosen_by = nullptr,
-                  DrawFaces draw = DrawFaces::kByLight);
+                  DrawFaces draw = DrawFaces::kByLight,
+                  std::shared_ptr<const Environment> environment = nullptr);
 
   bool empty() const { return all_.empty(); }
   // True if any shape emits.
   bool on_shapes() const { return !area_lights_.empty(); }
+  // The environment as it is drawn; null if there is none.
+  const Environment* drawn_environment() const { return environment_.get(); }
   std::span<const Light* const> all() const { return all_; }
 
   // A shading point with the estimated unoccluded irradiance of all lights [W / m^2, luminance].
@@ -104,9 +109,9 @@ class Lights {
   std::vector<size_t> in_tree_;   // its lights
   std::vector<size_t> listed_;    // with a tree, all others
   static constexpr size_t kListed = SIZE_MAX;
-  std::vector<size_t> of_light_;    // with a tree, the place of each light there, or kListed
-  const Environment* environment_;  // null if none
-  const Lights* chosen_by_;         // null: this
+  std::vector<size_t> of_light_;  // with a tree, the place of each light there, or kListed
+  std::shared_ptr<const Environment> environment_;  // null if none
+  const Lights* chosen_by_;                         // null: this
 };
 
 }  // namespace limn
