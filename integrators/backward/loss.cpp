@@ -133,10 +133,13 @@ void add_level(const Level& level, const Level& finest, int doublings, const Los
 }
 
 void check_method(const Method& method) {
-  if (method->image && !method->image->looks_around) return;
+  const auto fits = [](const MethodType& type) {
+    return type.image && !type.image->looks_around && !type.image->make;
+  };
+  if (fits(*method)) return;
   std::vector<std::string> known;
   for (const MethodType& type : method_types())
-    if (type.image && !type.image->looks_around) known.push_back(type.name);
+    if (fits(type)) known.push_back(type.name);
   throw InputError(unknown_name("method for the images of a loss", method.name(), known));
 }
 

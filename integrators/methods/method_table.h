@@ -12,6 +12,10 @@ GradientResult run_differences(const MethodType& method, const Scene& scene,
 GradientResult run_blurred(const MethodType& method, const Scene& scene,
                            const GradientOptions& options, const RunSettings& settings);
 
+std::unique_ptr<SampleEstimator> make_interpolated_estimator(const Scene& scene,
+                                                             const RunSettings& settings,
+                                                             const Settings& choices);
+
 // All but those that work term by term.
 inline std::vector<MethodType> other_methods() {
   return {{.name = "fd",
@@ -59,7 +63,32 @@ inline std::vector<MethodType> other_methods() {
            .biased = true,
            .check = check_blurred,
            .image = ImageMethod{},
-           .run = run_blurred}};
+           .run = run_blurred},
+          {.name = "interpolated",
+           .description = "direct light of the sky on diffuse surfaces, from the exact outlines of "
+                          "the sky at vertices: fast and biased",
+           .settings = {{"interpolate",
+                         "between vertices: the outline, the radiance of three outlines, signed "
+                         "distances from them, or nothing (exact outlines; rays to where the sky "
+                         "is bright and open)",
+                         {"outline", "radiance", "distances", "nothing", "rays"}},
+                        {"shading",
+                         "points where light is evaluated: pixels' own, vertices, or as many of a "
+                         "triangle as the sky's detail asks for (adaptive)",
+                         {"pixel", "vertex", "adaptive"}},
+                        {"subdivision",
+                         "of adaptive shading: 2 to this times the light's change",
+                         {"4", "0", "1", "2", "8", "16", "32"}},
+                        {"loops",
+                         "of one vertex that go with one of another: one at most, or all",
+                         {"one", "all"}},
+                        {"gloss-cap",
+                         "around mirror directions: the share of a glossy lobe's energy in it",
+                         {"0.9", "0.5", "0.7", "0.99"}},
+                        {"tolerance",
+                         "of the open sky, above which faces are cut; 0: they are not",
+                         {"0.01", "0", "0.03", "0.003", "0.001"}}},
+           .image = ImageMethod{.make = make_interpolated_estimator}}};
 }
 
 }  // namespace limn

@@ -51,7 +51,7 @@ std::unique_ptr<SampleEstimator> make_estimator(const Scene& scene, const RunSet
   check_task(options.method, Task::kImage);
   const ImageMethod& method = *options.method->image;
   const Numbers numbers = numbers_of(options.generator);  // checked for all
-  if (method.looks_around) check_still(scene, "the method \"" + options.method.name() + "\"");
+  if (method.looks_around || method.make) check_still(scene, "the method \"" + options.method.name() + "\"");
   check_points(options.points, method.closed_light, options.method.name());
   if (!method.looks_around && options.what != RenderWhat::kImage) {
     throw InputError(
@@ -64,6 +64,7 @@ std::unique_ptr<SampleEstimator> make_estimator(const Scene& scene, const RunSet
   if (method.looks_around) {
     return std::make_unique<VisibilityEstimator>(scene, settings, options);
   }
+  if (method.make) return method.make(scene, settings, options.method->settings);
   if (options.method->blurs) {
     const Blur blur = resolved(options.method->blurred_by(options.blur), scene);
     return std::make_unique<BlurredEstimator>(scene, blur, std::span<const BlurredNumber>(),

@@ -109,7 +109,7 @@ const std::vector<Rooms>& all_rooms() {
       {"edgetree",
        {"edges", "lobe", "light", "bounds", "forest", "quadric", "baselines", "rejection"}},
       {"integrators",
-       {"estimates", "edges", "lights", "contours", "paths", "film", "terms", "pilot", "methods",
+       {"estimates", "edges", "lights", "contours", "paths", "film", "terms", "pilot", "methods", "interpolation",
         "backward", "fit", "compare"}},
   };
   return rooms;

@@ -2,6 +2,7 @@
 // The table of methods: one row for each way to an image or to a derivative. `--method` names a row
 // in all commands, `method=` in Python; none of them knows a row by its name.
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -15,6 +16,8 @@
 
 namespace limn {
 
+class SampleEstimator;
+
 // How a method makes images.
 struct ImageMethod {
   bool closed_light = false;  // light that is scattered once, in closed form
@@ -23,6 +26,9 @@ struct ImageMethod {
   bool by_lines = false;       // between silhouettes
   bool uniform_lines = false;  // through a map at equal azimuths
   bool from_lights = false;    // also particles, see light_traced_estimator.h
+  // What samples the pixels, for a method with an estimator of its own: of direct light, biased.
+  std::unique_ptr<SampleEstimator> (*make)(const Scene&, const RunSettings&,
+                                           const Settings&) = nullptr;
 };
 
 // How a method computes in reverse mode.
