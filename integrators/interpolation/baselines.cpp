@@ -10,9 +10,9 @@
 namespace limn {
 namespace {
 
-constexpr int kRows = 32;     // of directions of signed distances
-constexpr int kSkyRows = 128;  // of cells of the sky that rays are drawn from
-constexpr int kMapRows = 16;   // of the map of where it is open
+constexpr int kRows = 32;        // of directions of signed distances
+constexpr int kSkyRows = 128;    // of cells of the sky that rays are drawn from
+constexpr int kMapRows = 16;     // of the map of where it is open
 constexpr double kFloor = 0.05;  // of the mean, where no path was open
 
 Vec3d direction(double column, double row, int rows) {
@@ -23,7 +23,8 @@ Vec3d direction(double column, double row, int rows) {
 size_t cell_of(const Vec3d& w, int rows) {
   const double turn = std::atan2(w.z, w.x) / (2 * kPi);
   const double theta = std::acos(std::clamp(w.y, -1.0, 1.0)) / kPi;
-  const int column = std::min(static_cast<int>((turn < 0 ? turn + 1 : turn) * 2 * rows), 2 * rows - 1);
+  const int column =
+      std::min(static_cast<int>((turn < 0 ? turn + 1 : turn) * 2 * rows), 2 * rows - 1);
   const int row = std::min(static_cast<int>(theta * rows), rows - 1);
   return static_cast<size_t>(row) * 2 * rows + column;
 }
@@ -57,7 +58,8 @@ SignedDistances::SignedDistances(const Environment& sky, const SkyMesh& mesh,
       Cell cell{direction(i + 0.5, j + 0.5, kRows), {}};
       const double share = solid_angle(cells_.size(), kRows) / (kFine * kFine);
       for (int k = 0; k < kFine * kFine; ++k) {
-        const Vec3d w = direction(i + (k % kFine + 0.5) / kFine, j + (k / kFine + 0.5) / kFine, kRows);
+        const Vec3d w =
+            direction(i + (k % kFine + 0.5) / kFine, j + (k / kFine + 0.5) / kFine, kRows);
         const Rgb<double> light = sky.radiance(w) * share;
         for (int c = 0; c < 3; ++c) {
           const auto l = static_cast<float>(light[c]);
@@ -133,8 +135,8 @@ OpenSkyRays::OpenSkyRays(const Scene& scene, const RayTracer& tracer,
         bright += luminance(l) + 1e-6;
       }
       const size_t map = cell_of(w, kMapRows);
-      cells_.add(bright * solid_angle(cells_.size(), kSkyRows) *
-                 (floor + open[map]) / solid_angle(map, kMapRows));
+      cells_.add(bright * solid_angle(cells_.size(), kSkyRows) * (floor + open[map]) /
+                 solid_angle(map, kMapRows));
     }
   }
 }
@@ -158,8 +160,8 @@ Rgb<double> OpenSkyRays::sample(const SurfacePoint<double>& surface, const Vec3d
                                 RayCount& rays) const {
   Rgb<double> sum;
   const auto add = [&](const Vec3d& w) {
-    const double by_bsdf = scattering.bsdf().pdf_solid_angle(scattering.normal(), scattering.wi(),
-                                                             w, scattering.at());
+    const double by_bsdf =
+        scattering.bsdf().pdf_solid_angle(scattering.normal(), scattering.wi(), w, scattering.at());
     const Rgb<double> f = scattering.eval(w);
     if (is_black(f) || !open(surface, up, w, rays)) return;
     sum += f * scene_.environment->radiance(w) * (1 / (pdf(w) + by_bsdf));
@@ -172,7 +174,8 @@ Rgb<double> OpenSkyRays::sample(const SurfacePoint<double>& surface, const Vec3d
   const double cosine = c0 + (c1 - c0) * draw.fraction;
   add(direction(column + u2, std::acos(cosine) * kSkyRows / kPi, kSkyRows));
   const double u3 = rng.uniform(), u4 = rng.uniform();
-  const auto wo = scattering.bsdf().sample(scattering.normal(), scattering.wi(), u3, u4, scattering.at());
+  const auto wo =
+      scattering.bsdf().sample(scattering.normal(), scattering.wi(), u3, u4, scattering.at());
   if (wo) add(*wo);
   return sum;
 }

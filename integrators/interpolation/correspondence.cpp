@@ -30,6 +30,8 @@ struct Group {
   std::vector<Indices> items;
 
   bool crosses(const Indices& at, const Indices* own) const;
+  // Drops pairs that other items hold.
+  void drop_repeated();
   // Whether the rules allow it; `same` is then the item that it completes or repeats, if any.
   bool allows(const Indices& at, int& same) const;
 };
@@ -56,6 +58,16 @@ bool Group::crosses(const Indices& at, const Indices* own) const {
   return false;
 }
 
+void Group::drop_repeated() {
+  for (size_t i = items.size(); i-- > 0;) {
+    const bool held = std::ranges::any_of(items, [&](const Indices& other) {
+      const auto fits = [&](int k) { return items[i][k] < 0 || items[i][k] == other[k]; };
+      return &other != &items[i] && fits(0) && fits(1) && fits(2);
+    });
+    if (held) items.erase(items.begin() + static_cast<int64_t>(i));
+  }
+}
+
 bool Group::allows(const Indices& at, int& same) const {
   same = -1;
   for (size_t i = 0; i < items.size(); ++i) {
@@ -80,8 +92,10 @@ class Match {
   struct Place {
     int group = -1, index = 0;
   };
-  // Of the corner of a vertex; group -1: it is in none.
-  Place place(int k, uint32_t corner) const { return places_[offsets_[k] + corner]; }
+  // Of the corner of a vertex; group -1: it is in none, or another vertex's.
+  Place place(int k, uint32_t corner) const {
+    return corner < offsets_[k + 1] - offsets_[k] ? places_[offsets_[k] + corner] : Place{};
+  }
   uint32_t corner(int k, const Group& group, int index) const {
     return group.cycles[k][index] - offsets_[k];
   }
@@ -233,7 +247,7 @@ void Match::pair_loops() {
   }
 }
 
-// As published: all loops of a vertex are one sequence, here by way of the first one's first corner.
+// As published: all loops of a vertex are one sequence, here by way of the first one's start.
 void Match::join_loops() {
   std::array<std::vector<uint32_t>, 3> cycles;
   for (int k = 0; k < 3; ++k) {
@@ -273,7 +287,8 @@ std::vector<uint32_t> Match::nearest(const Group& group, const Indices& at, int 
     if (j != k) pair += directions_[group.cycles[j][at[j]]];
   }
   std::vector<std::pair<double, uint32_t>> order;
-  for (uint32_t i = 0; i < cycle.size(); ++i) order.push_back({-dot(pair, directions_[cycle[i]]), i});
+  for (uint32_t i = 0; i < cycle.size(); ++i)
+    order.push_back({-dot(pair, directions_[cycle[i]]), i});
   const size_t count = std::min(order.size(), kMostTried);
   std::partial_sort(order.begin(), order.begin() + static_cast<int64_t>(count), order.end());
   std::vector<uint32_t> indices;
@@ -322,6 +337,7 @@ SkyTriples Match::finish() const {
       if (*std::min_element(item.begin(), item.end()) >= 0) items.push_back(item);
     }
     std::sort(items.begin(), items.end());
+    items.erase(std::unique(items.begin(), items.end()), items.end());
     if (items.empty()) {
       // The first corner of the longest cycle, and those nearest to it.
       Indices start{};
@@ -333,8 +349,7 @@ SkyTriples Match::finish() const {
         if (j == k) continue;
         double most = -2;
         for (size_t i = 0; i < group.cycles[j].size(); ++i) {
-          const double c =
-              dot(directions_[group.cycles[j][i]], directions_[group.cycles[k][0]]);
+          const double c = dot(directions_[group.cycles[j][i]], directions_[group.cycles[k][0]]);
           if (c > most) most = c, start[j] = static_cast<int>(i);
         }
       }
@@ -460,6 +475,7 @@ bool Selection::complete(uint32_t patch) {
   Match& own = *matches_[patch];
   bool changed = false;
   for (int g = 0; g < static_cast<int>(own.groups.size()); ++g) {
+    own.groups[g].drop_repeated();
     for (size_t i = 0; i < own.groups[g].items.size(); ++i) {
       const Group& group = own.groups[g];
       const Indices item = group.items[i];
@@ -474,7 +490,7 @@ bool Selection::complete(uint32_t patch) {
         std::vector<Pair> pairs{full};
         if (!ask(patch, g, full.at, sides, pairs)) continue;
         take(pairs);
-        changed = true;
+        changed = changed || full.same == static_cast<int>(i);
         break;
       }
     }

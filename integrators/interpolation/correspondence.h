@@ -24,8 +24,8 @@ struct SkyTriples {
 };
 
 struct CorrespondenceOptions {
-  uint64_t seed = 0;          // of the order of patches
-  bool single_loops = true;   // a loop goes with at most one of each other polygon
+  uint64_t seed = 0;         // of the order of patches
+  bool single_loops = true;  // a loop goes with at most one of each other polygon
   int threads = 1;
 };
 

@@ -15,9 +15,9 @@ double power_of(double alpha) { return std::max(1.0, 2 / (alpha * alpha) - 2); }
 Rgb<double> albedo(const Scattering<double>& scattering) {
   Rgb<double> sum;
   for (int k = 0; k < 4; ++k) {
-    const auto wo = scattering.bsdf().sample(scattering.normal(), scattering.wi(),
-                                             0.25 + 0.5 * (k % 2), 0.25 + 0.5 * (k / 2),
-                                             scattering.at());
+    const auto wo =
+        scattering.bsdf().sample(scattering.normal(), scattering.wi(), 0.25 + 0.5 * (k % 2),
+                                 0.25 + 0.5 * (k / 2), scattering.at());
     if (!wo) continue;
     const double pdf = scattering.bsdf().pdf_solid_angle(scattering.normal(), scattering.wi(), *wo,
                                                          scattering.at());
@@ -29,9 +29,7 @@ Rgb<double> albedo(const Scattering<double>& scattering) {
 }  // namespace
 
 Gloss::Gloss(const Environment& sky, double alpha, double share)
-    : power_(power_of(alpha)),
-      cap_(std::pow(1 - share, 1 / (power_ + 1))),
-      sky_(sky, power_) {}
+    : power_(power_of(alpha)), cap_(std::pow(1 - share, 1 / (power_ + 1))), sky_(sky, power_) {}
 
 Rgb<double> Gloss::radiance(const RadianceTables& tables, const Scattering<double>& scattering,
                             DirectionLoops& loops) const {

@@ -22,9 +22,9 @@
 namespace limn {
 namespace {
 
-constexpr double kDetail = 256;     // power of the cosine that blurs the sky for `adaptive`
-constexpr int kMostParts = 32;      // of a triangle's side
-constexpr int kLooks = 2;           // rays along each side of a pixel that look for faces
+constexpr double kDetail = 256;  // power of the cosine that blurs the sky for `adaptive`
+constexpr int kMostParts = 32;   // of a triangle's side
+constexpr int kLooks = 2;        // rays along each side of a pixel that look for faces
 
 enum class Interpolate { kOutline, kRadiance, kDistances, kNothing, kRays };
 constexpr const char* kInterpolate[] = {"outline", "radiance", "distances", "nothing", "rays"};
@@ -108,8 +108,8 @@ class InterpolatedEstimator final : public SampleEstimator {
     add_gloss();
     const Environment& sky = *scene.environment;
     if (!sky.is_uniform() || !gloss_.empty()) {
-      const auto grid = sky.grid().value_or(
-          Environment::Grid{{0, 1, 0}, {1, 0, 0}, {0, 0, -1}, 256, 129});
+      const auto grid =
+          sky.grid().value_or(Environment::Grid{{0, 1, 0}, {1, 0, 0}, {0, 0, -1}, 256, 129});
       tables_.emplace(grid, grid.columns, grid.rows - 1,
                       [&](const Vec3d& w) { return sky.radiance(w); });
     }
@@ -187,8 +187,8 @@ std::vector<SeenSide> InterpolatedEstimator::seen_sides() const {
   std::map<std::array<uint32_t, 3>, SeenSide> found;
   for (int y = 0; y < film.crop_height * kLooks; ++y) {
     for (int x = 0; x < film.crop_width * kLooks; ++x) {
-      const auto start = camera_.ray(film.crop_x + (x + 0.5) / kLooks,
-                                     film.crop_y + (y + 0.5) / kLooks);
+      const auto start =
+          camera_.ray(film.crop_x + (x + 0.5) / kLooks, film.crop_y + (y + 0.5) / kLooks);
       Hit hit;
       if (!tracer_->closest(camera_ray(scene_, start), hit)) continue;
       const SeenSide side = side_of(scene_, hit.face, start.direction);
@@ -228,8 +228,7 @@ Rgb<double> InterpolatedEstimator::exact(const SkyMesh::Vertex& vertex,
   return light(vertex.n, to, loops);
 }
 
-Rgb<double> InterpolatedEstimator::between(const SkyMesh::Spot& spot,
-                                           const SkyMesh::Vertex& vertex,
+Rgb<double> InterpolatedEstimator::between(const SkyMesh::Spot& spot, const SkyMesh::Vertex& vertex,
                                            const Scattering<double>* to,
                                            DirectionLoops& loops) const {
   const Vec3d &p = vertex.at.p, &n = vertex.n;
@@ -341,9 +340,8 @@ Rgb<double> InterpolatedEstimator::sample(const KeyedSample& sample, RayCount& r
   const Vec3d n = scattering.normal();
   if (rays_) return rays_->sample(surface, n, scattering, sample.key.at(Purpose::kDirect, 0), rays);
   const SkyMesh::Vertex vertex{contours_.at(surface, n), n};
-  const auto spot =
-      mesh_->find(side_of(scene_, hit.face, start.direction),
-                  place_on_face(scene_, hit.face, start.origin, start.direction));
+  const auto spot = mesh_->find(side_of(scene_, hit.face, start.direction),
+                                place_on_face(scene_, hit.face, start.origin, start.direction));
   if (!spot) return exact(vertex, &scattering, loops);
   if (choices_.shading == Shading::kPixel) return between(*spot, vertex, &scattering, loops);
   return scattering.eval(n) * look_up(*spot);

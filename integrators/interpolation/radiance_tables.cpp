@@ -133,8 +133,7 @@ SkyLight RadianceTables::light(const DirectionLoops& loops) const {
     if (!(last == a)) end = place(a), at_end = sum(end.phi, end.theta);
     Vec3d from = a;
     for (int k = 1; k <= pieces; ++k) {
-      const Vec3d to =
-          k == pieces ? b : normalize(a + (b - a) * (static_cast<double>(k) / pieces));
+      const Vec3d to = k == pieces ? b : normalize(a + (b - a) * (static_cast<double>(k) / pieces));
       const Place next = place(to);
       const SkyLight at_next = sum(next.phi, next.theta);
       // The short way around, from the end's azimuth.
@@ -167,8 +166,7 @@ BlurredSky::BlurredSky(const Environment& environment, double power) {
   };
   const auto direction = [](double column, double row) {
     const double phi = column * (kPi / kRows), theta = row * (kPi / kRows);
-    return Vec3d{std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi),
-                 std::cos(theta)};
+    return Vec3d{std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)};
   };
   std::vector<Sample> samples;
   for (int j = 0; j < kRows * kFine; ++j) {

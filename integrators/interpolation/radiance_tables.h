@@ -20,12 +20,8 @@ struct SkyLight {
     const auto of = [&](int c) { return n.x * x[c] + n.y * y[c] + n.z * z[c]; };
     return {of(0), of(1), of(2)};
   }
-  SkyLight operator+(const SkyLight& o) const {
-    return {x + o.x, y + o.y, z + o.z, all + o.all};
-  }
-  SkyLight operator-(const SkyLight& o) const {
-    return {x - o.x, y - o.y, z - o.z, all - o.all};
-  }
+  SkyLight operator+(const SkyLight& o) const { return {x + o.x, y + o.y, z + o.z, all + o.all}; }
+  SkyLight operator-(const SkyLight& o) const { return {x - o.x, y - o.y, z - o.z, all - o.all}; }
   SkyLight operator*(float s) const { return {x * s, y * s, z * s, all * s}; }
 };
 

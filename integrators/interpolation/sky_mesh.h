@@ -18,8 +18,8 @@ namespace limn {
 void view_of(const SkyPolygons& sky, const Vec3d& p, DirectionLoops& loops);
 
 struct SkyMeshOptions {
-  // Faces are halved along each side, most_halvings times at most, until at the center of each triangle the
-  // mean of its vertices' views differs by at most this part of an open sky; 0: never.
+  // Faces are halved along each side, most_halvings times at most, until at the center of each
+  // triangle the mean of its vertices' views differs by at most this part of an open sky; 0: never.
   double tolerance = 0.01;
   int most_halvings = 4;
   CorrespondenceOptions triples;

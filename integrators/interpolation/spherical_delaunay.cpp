@@ -46,7 +46,8 @@ std::vector<std::array<uint32_t, 3>> spherical_delaunay(std::span<const Vec3d> p
     for (const auto& [side, seen] : rim) {
       if (!rim.contains({side.second, side.first})) add(side.first, side.second, p);
     }
-    if (facets.size() > 4 * x.size()) std::erase_if(facets, [](const Facet& f) { return !f.alive; });
+    if (facets.size() > 4 * x.size())
+      std::erase_if(facets, [](const Facet& f) { return !f.alive; });
   }
   std::vector<std::array<uint32_t, 3>> result;
   for (const Facet& facet : facets) {

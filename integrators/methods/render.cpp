@@ -51,7 +51,8 @@ std::unique_ptr<SampleEstimator> make_estimator(const Scene& scene, const RunSet
   check_task(options.method, Task::kImage);
   const ImageMethod& method = *options.method->image;
   const Numbers numbers = numbers_of(options.generator);  // checked for all
-  if (method.looks_around || method.make) check_still(scene, "the method \"" + options.method.name() + "\"");
+  if (method.looks_around || method.make)
+    check_still(scene, "the method \"" + options.method.name() + "\"");
   check_points(options.points, method.closed_light, options.method.name());
   if (!method.looks_around && options.what != RenderWhat::kImage) {
     throw InputError(

@@ -216,8 +216,9 @@ TEST_F(Program, ComparesOnlyWhatItKnows) {
                               files_.path("folder") + " --methods ";
   const std::string text = refused(compare + "forest,forrest");
   EXPECT_NE(text.find("unknown method \"forrest\" (known: adaptive, "), std::string::npos) << text;
-  EXPECT_NE(text.find("fd, path, light-traced, lines, rays, blurred, blurred-published)"),
-            std::string::npos)
+  EXPECT_NE(
+      text.find("fd, path, light-traced, lines, rays, blurred, blurred-published, interpolated)"),
+      std::string::npos)
       << text;
   EXPECT_NE(refused(compare + "forest,forest").find("given twice"), std::string::npos);
   EXPECT_NE(refused(compare + "fd --terms interior").find("all terms in one"), std::string::npos);

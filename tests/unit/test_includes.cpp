@@ -109,8 +109,8 @@ const std::vector<Rooms>& all_rooms() {
       {"edgetree",
        {"edges", "lobe", "light", "bounds", "forest", "quadric", "baselines", "rejection"}},
       {"integrators",
-       {"estimates", "edges", "lights", "contours", "paths", "film", "terms", "pilot", "methods", "interpolation",
-        "backward", "fit", "compare"}},
+       {"estimates", "edges", "lights", "contours", "paths", "film", "terms", "pilot", "methods",
+        "interpolation", "backward", "fit", "compare"}},
   };
   return rooms;
 }
