@@ -133,13 +133,10 @@ void add_level(const Level& level, const Level& finest, int doublings, const Los
 }
 
 void check_method(const Method& method) {
-  const auto fits = [](const MethodType& type) {
-    return type.image && !type.image->looks_around && !type.image->make;
-  };
-  if (fits(*method)) return;
+  if (method->image && !method->image->looks_around) return;
   std::vector<std::string> known;
   for (const MethodType& type : method_types())
-    if (fits(type)) known.push_back(type.name);
+    if (type.image && !type.image->looks_around) known.push_back(type.name);
   throw InputError(unknown_name("method for the images of a loss", method.name(), known));
 }
 

@@ -58,6 +58,7 @@ class ImageRuns final : public TimedMethod {
     if (options_.method->image->by_lines) {
       return {{"lines", double(options_.lines)}, {"tolerance", options_.tolerance}};
     }
+    if (options_.method->image->make) return {};
     if (looks_around()) return {{"rays", double(options_.rays)}};
     return {{"generator", options_.generator}};
   }

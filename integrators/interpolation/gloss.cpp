@@ -44,7 +44,7 @@ Rgb<double> Gloss::radiance(const RadianceTables& tables, const Scattering<doubl
   }
   cap.close();
   for (int i = 0; i < kCapSides; ++i) {
-    loops.cut(cross(cap.directions[i], cap.directions[(i + 1) % kCapSides]));
+    loops.cut(cross(cap.directions[i], cap.directions[(i + 1) % kCapSides]), r);
   }
   const auto in_cap = [&](const DirectionLoops& region) {
     const SkyLight light = tables.light(region);

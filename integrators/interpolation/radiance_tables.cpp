@@ -28,10 +28,11 @@ Vec3d mean_direction(const DirectionLoops& loops) {
   return sum;
 }
 
-void DirectionLoops::cut(const Vec3d& normal) {
+void DirectionLoops::cut(const Vec3d& normal, const Vec3d& around) {
   DirectionLoops whole;
   std::swap(whole, *this);
   const auto add = [&](const Vec3d& w) { directions.push_back(w); };
+  const Vec3d middle = normalize(around - normal * (dot(normal, around) / length_squared(normal)));
   size_t loop = 1;
   uint32_t i = 0;
   const auto finish = [&] {
@@ -41,6 +42,7 @@ void DirectionLoops::cut(const Vec3d& normal) {
     const double at_a = dot(normal, a), at_b = dot(normal, b);
     if (at_a >= 0) add(a);
     if ((at_a >= 0) != (at_b >= 0)) add(normalize(a + (b - a) * (at_a / (at_a - at_b))));
+    if (at_a >= 0 && at_b < 0) add(middle);
     ++i;
     finish();
   });
@@ -94,7 +96,7 @@ RadianceTables::Place RadianceTables::place(const Vec3d& w) const {
 // phi from -columns to 2 columns: whole turns are added.
 SkyLight RadianceTables::sum(double phi, double theta) const {
   const size_t stride = static_cast<size_t>(columns_) + 1;
-  const int row = std::min(static_cast<int>(theta), rows_ - 1);
+  const int row = std::clamp(static_cast<int>(theta), 0, rows_ - 1);
   const auto v = static_cast<float>(theta - row);
   const SkyLight* cells = &cells_[row * stride];
   int turns = 0;
@@ -152,8 +154,12 @@ SkyLight RadianceTables::light(const DirectionLoops& loops) const {
     last = b;
   });
   total = total * static_cast<float>(turns_right_);
-  // A region that holds the opposite of the pole is what its loops leave of the sphere.
-  if (winding * turns_right_ < -0.5 * columns_) total = total + sum(columns_, rows_);
+  // A region that holds the opposite of the pole is what its loops leave of the sphere; beside the
+  // horizon an interpolated one may hold both, and turn around neither. 0.02: above errors of the
+  // tables. Not tuned.
+  const SkyLight whole = sum(columns_, rows_);
+  const bool turns_back = winding * turns_right_ < -0.5 * columns_;
+  if (turns_back || sum_of(total.all) < -0.02 * sum_of(whole.all)) total = total + whole;
   return total;
 }
 

@@ -41,8 +41,9 @@ struct DirectionLoops {
       }
     }
   }
-  // What of the region lies before the plane through the eye.
-  void cut(const Vec3d& normal);
+  // What of the region lies before a plane, around a direction there: sides along the plane go by
+  // its point that is nearest to that, as they may take half a turn.
+  void cut(const Vec3d& normal, const Vec3d& around);
 };
 
 // The integral of w over a region (Lambert): half the angles of its segments times the normals of

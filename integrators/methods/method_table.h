@@ -88,7 +88,7 @@ inline std::vector<MethodType> other_methods() {
                         {"tolerance",
                          "of the open sky, above which faces are cut; 0: they are not",
                          {"0.01", "0", "0.03", "0.003", "0.001"}}},
-           .image = ImageMethod{.make = make_interpolated_estimator}}};
+           .image = ImageMethod{.looks_around = true, .make = make_interpolated_estimator}}};
 }
 
 }  // namespace limn

@@ -27,7 +27,7 @@ namespace {
 std::vector<std::string> names_looking_around() {
   std::vector<std::string> names;
   for (const MethodType& type : method_types()) {
-    if (type.image && type.image->looks_around) names.push_back(type.name);
+    if (type.image && type.image->looks_around && !type.image->make) names.push_back(type.name);
   }
   return names;
 }
@@ -51,10 +51,9 @@ std::unique_ptr<SampleEstimator> make_estimator(const Scene& scene, const RunSet
   check_task(options.method, Task::kImage);
   const ImageMethod& method = *options.method->image;
   const Numbers numbers = numbers_of(options.generator);  // checked for all
-  if (method.looks_around || method.make)
-    check_still(scene, "the method \"" + options.method.name() + "\"");
+  if (method.looks_around) check_still(scene, "the method \"" + options.method.name() + "\"");
   check_points(options.points, method.closed_light, options.method.name());
-  if (!method.looks_around && options.what != RenderWhat::kImage) {
+  if ((!method.looks_around || method.make) && options.what != RenderWhat::kImage) {
     throw InputError(
         fmt::format("the method \"{}\" knows radiance alone: how open the sky is say {}",
                     options.method.name(), join(names_looking_around())));
@@ -62,10 +61,10 @@ std::unique_ptr<SampleEstimator> make_estimator(const Scene& scene, const RunSet
   if (options.points == FilmPoints::kFaces) {
     return std::make_unique<FacesEstimator>(scene, std::span<const Parameter>(), settings.threads);
   }
+  if (method.make) return method.make(scene, settings, options.method->settings);
   if (method.looks_around) {
     return std::make_unique<VisibilityEstimator>(scene, settings, options);
   }
-  if (method.make) return method.make(scene, settings, options.method->settings);
   if (options.method->blurs) {
     const Blur blur = resolved(options.method->blurred_by(options.blur), scene);
     return std::make_unique<BlurredEstimator>(scene, blur, std::span<const BlurredNumber>(),

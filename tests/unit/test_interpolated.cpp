@@ -246,7 +246,9 @@ TEST(Interpolated, ImagesAreThoseOfLines) {
       const std::string method = std::string("interpolated") + setting;
       const double error = difference(image_of(scene, method), lines);
       fmt::print("{} {}: {:.4f} of the light differs\n", smooth ? "smooth" : "flat", method, error);
-      EXPECT_LT(error, setting == std::string(":shading=vertex") ? 0.1 : 0.05) << method;
+      // Noise of 32 rays a pixel; four colours of a triangle; outlines.
+      const std::string name = setting;
+      EXPECT_LT(error, name.ends_with("rays") || name.ends_with("vertex") ? 0.15 : 0.03) << method;
     }
   }
 }
@@ -259,9 +261,10 @@ TEST(Interpolated, ThreadsDoNotMatter) {
 
 TEST(Interpolated, SaysWhatItDoesNotKnow) {
   const TempFiles files;
+  RenderOptions options = with("interpolated");
   const auto refused = [&](const Scene& scene) -> std::string {
     try {
-      render(scene, {}, with("interpolated"));
+      render(scene, {}, options);
     } catch (const InputError& error) {
       return error.what();
     }
@@ -274,6 +277,9 @@ TEST(Interpolated, SaysWhatItDoesNotKnow) {
             std::string::npos);
   const std::string mirror = square("mirror", 1, 0, {0, 1, 0}, conductor("m", 0.1));
   EXPECT_NE(refused(over_floor(files, {}, false, kSky + mirror)).find("only diffuse surfaces"),
+            std::string::npos);
+  options.what = RenderWhat::kAmbientOcclusion;
+  EXPECT_NE(refused(over_floor(files, {}, false, kSky)).find("knows radiance alone"),
             std::string::npos);
   EXPECT_FALSE(Method("interpolated")->can(Task::kGradient));
   EXPECT_FALSE(Method("interpolated")->can(Task::kBackward));

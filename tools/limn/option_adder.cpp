@@ -119,7 +119,7 @@ void check_image_options(const CLI::App& app, const std::vector<Method>& methods
                    "an option of the methods silhouettes and lines alone");
   }
   const auto by_rays = [](const ImageMethod& image) {
-    return image.looks_around && !image.by_lines;
+    return image.looks_around && !image.by_lines && !image.make;
   };
   if (!any(by_rays)) refuse_options(app, {"--rays"}, "an option of the method rays alone");
 }
