@@ -253,6 +253,19 @@ TEST(Interpolated, ImagesAreThoseOfLines) {
   }
 }
 
+// Phong's lobe for a conductor's, four directions for its albedo: near, not equal.
+TEST(Interpolated, GlossUnderAConstantSky) {
+  const TempFiles files;
+  const std::string plate = square("plate", 4, -90, {0, 0.01, 0}, conductor("metal", 0.3));
+  const Scene open = over_floor(files, {}, false, kSky + plate);
+  const Image rays = image_of(open, "rays", 64);
+  for (const char* method : {"interpolated", "interpolated:gloss-cap=0.5"}) {
+    const double error = difference(image_of(open, method, 4), rays);
+    fmt::print("{}: {:.4f} of the light differs\n", method, error);
+    EXPECT_LT(error, 0.1) << method;
+  }
+}
+
 TEST(Interpolated, ThreadsDoNotMatter) {
   const TempFiles files;
   const Scene scene = ring(files, make_sun(files, "sun"), true);
