@@ -229,6 +229,11 @@ void Fit::Impl::check_remeshing() {
         throw InputError(shape.where,
                          "\"" + shape.id + "\" is shaded flat: remeshing would lose its edges");
       }
+      if (shape.mesh.textured) {
+        throw InputError(shape.where, "\"" + shape.id +
+                                          "\" has textures: remeshing would lose their "
+                                          "coordinates; leave out the one or the other");
+      }
       remesh(shape.mesh, options_.remesh_edge * mean_edge_length(shape.mesh), shape.where);
       any = true;
     }

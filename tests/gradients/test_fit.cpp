@@ -451,6 +451,11 @@ TEST(Fit, RefusesWhatCannotBeFitted) {
   EXPECT_NE(refused(options, other).find("the same vertices and faces"), std::string::npos);
   options.remesh = {3, 0};
   EXPECT_NE(refused(options, views).find("remesh: 0 is not a number from 1 to"), std::string::npos);
+  options.remesh = {1000};
+  other = views;
+  for (FitView& view : other) view.scene.shapes[1].mesh.textured = true;
+  EXPECT_NE(refused(options, other).find("\"body\" has textures: remeshing would lose"),
+            std::string::npos);
   options.remesh = {};
   options.parameters = {"clay.reflectance"};
   options.backward.terms = {"interior", "shadow"};
