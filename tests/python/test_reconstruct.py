@@ -16,7 +16,7 @@ from limn.photo_cameras import read_cameras
 from limn.photo_fit import PhotoFit, Plan, posed
 from limn.photo_hull import checked, marching_tetrahedra, visual_hull
 from limn.photo_model import Model, scenes_of
-from limn.photo_output import baked, rendered, write_glb
+from limn.photo_output import baked, psnr, rendered, unwrapped, write_glb, write_model
 from limn.photo_views import View, _resampled, read_views
 from limn.reconstruction import _most_faces
 
@@ -450,6 +450,30 @@ def test_other_programs_read_gltf(tmp_path):
     np.testing.assert_allclose(mesh.vertices, positions)
     np.testing.assert_array_equal(mesh.faces, faces)
     assert mesh.visual.material.roughnessFactor == pytest.approx(0.4)
+
+
+# Charts lie apart: where one touches another, its corners would show the other's colours.
+def test_an_atlas_shows_what_the_vertices_have(egg):
+    pytest.importorskip("xatlas")
+    views = read(egg)[:2]
+    positions, faces = visual_hull(views, 24)
+    model = Model(positions, faces, np.full((len(positions), 3), 0.5)).remeshed(600)
+    place = (model.positions - model.positions.min(axis=0)) / np.ptp(model.positions, axis=0)
+    model.colours, model.roughness = 0.1 + 0.7 * place, 0.3 + 0.5 * place[:, 0]
+    names = write_model(str(egg), model, views)
+    assert {"albedo.png", "roughness.png", "object.mtl"} <= set(names)
+    assert all((egg / name).exists() for name in names)
+    vertices, corners, uv = unwrapped(model.positions, model.faces)
+    np.testing.assert_array_equal(vertices[corners], model.faces)
+    assert (uv >= 0).all() and (uv <= 1).all()
+    albedo = limn.read_image(egg / "albedo.png")
+    for place, shown in ((uv, model.colours[vertices]),
+                         (uv[corners].mean(axis=1), model.colours[model.faces].mean(axis=1))):
+        at = np.minimum(np.stack([1 - place[:, 1], place[:, 0]], 1) * 512, 511).astype(int)
+        np.testing.assert_allclose(albedo[at[:, 0], at[:, 1]], shown, atol=0.02)
+    scene = limn.load(egg / "scene.xml")
+    for k, image in enumerate(rendered(model, views, 256)):
+        assert psnr(limn.render(scene.view(k), spp=256).value, image, np.ones(image.shape[:2])) > 35
 
 
 # A ball, half of it shiny, and nothing else left to explain.

@@ -55,9 +55,13 @@ def unwrapped(positions: Any, faces: Any) -> tuple[Any, Any, Any] | None:
         import xatlas
     except ImportError:
         return None
-    vertices, corners, places = xatlas.parametrize(
-        np.ascontiguousarray(positions, np.float32), np.ascontiguousarray(faces, np.uint32)
-    )
+    atlas, pack = xatlas.Atlas(), xatlas.PackOptions()
+    # Charts that touch would show each other's texels where lookups are bilinear.
+    pack.resolution, pack.padding = _TEXELS, 2
+    atlas.add_mesh(np.ascontiguousarray(positions, np.float32),
+                   np.ascontiguousarray(faces, np.uint32))  # fmt: skip
+    atlas.generate(xatlas.ChartOptions(), pack)
+    vertices, corners, places = atlas[0]
     return vertices, np.asarray(corners, np.int64), np.asarray(places, float)
 
 
