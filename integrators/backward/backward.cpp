@@ -9,6 +9,7 @@
 #include "integrators/backward/parameter_slots.h"
 #include "integrators/backward/reverse_estimator.h"
 #include "integrators/backward/reverse_pilot.h"
+#include "integrators/backward/steps.h"
 #include "integrators/edges/scene_edges.h"
 #include "integrators/estimates/batches.h"
 #include "integrators/methods/hair_gaps.h"
@@ -109,10 +110,9 @@ BackwardResult run(const Scene& scene, std::unique_ptr<Estimator> owned, const I
   return result;
 }
 
-}  // namespace
-
+// kept: may be null.
 BackwardResult backward(const Scene& scene, const Image& adjoint, const BackwardOptions& options,
-                        const RunSettings& requested) {
+                        const RunSettings& requested, KeptEdges* kept) {
   check(options);
   const Stopwatch watch;
   RunSettings settings = settings_for(options.points, requested);
@@ -120,12 +120,24 @@ BackwardResult backward(const Scene& scene, const Image& adjoint, const Backward
     auto faces = std::make_unique<FacesGradient>(scene, adjoint, options, settings.threads);
     return run(scene, std::move(faces), adjoint, options, settings, watch);
   }
-  ReversePlan plan = planned(scene, adjoint, options, settings, watch);
+  ReversePlan plan = planned(scene, adjoint, options, settings, watch, kept);
   const BackwardOptions own = plan.estimator->options();
   BackwardResult result = run(scene, std::move(plan.estimator), adjoint, own, settings, watch);
   result.method = own.method.name();
   result.decision = plan.decision;
   return result;
+}
+
+}  // namespace
+
+BackwardResult backward(const Scene& scene, const Image& adjoint, const BackwardOptions& options,
+                        const RunSettings& settings) {
+  return backward(scene, adjoint, options, settings, nullptr);
+}
+BackwardResult backward(const Scene& scene, const Image& adjoint, const BackwardOptions& options,
+                        const RunSettings& settings, KeptEdges& kept) {
+  // With times the estimator at the reference time takes no samples.
+  return backward(scene, adjoint, options, settings, scene.exposure ? nullptr : &kept);
 }
 
 std::vector<std::string> trace_backward(const Scene& scene, const Image& adjoint,

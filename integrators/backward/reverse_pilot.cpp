@@ -474,9 +474,10 @@ BackwardOptions without_pilot(const BackwardOptions& options) {
 }
 
 ReversePlan planned(const Scene& scene, const Image& adjoint, const BackwardOptions& options,
-                    RunSettings& settings, const Stopwatch& watch) {
+                    RunSettings& settings, const Stopwatch& watch, KeptEdges* kept) {
   const auto plain = [&](const BackwardOptions& own) {
-    return ReversePlan{std::make_unique<ReverseEstimator>(scene, adjoint, own, settings.threads),
+    return ReversePlan{std::make_unique<ReverseEstimator>(scene, adjoint, own, settings.threads,
+                                                          std::nullopt, kept),
                        ""};
   };
   const bool chooses = options.method->reverse->chooses;

@@ -27,8 +27,8 @@ BackwardOptions without_pilot(const BackwardOptions& options);
 // a run is too short and the scene has light sets. Pilots take an eighth of the shortest run that
 // has one, about, or less. The plan follows from the seed, and from whether the samples are
 // enough for a pilot: with a limit of time, which watch has run towards since the run began,
-// settings are left that keep the run on one side.
+// settings are left that keep the run on one side. kept: for the estimator where there is no pilot.
 ReversePlan planned(const Scene& scene, const Image& adjoint, const BackwardOptions& options,
-                    RunSettings& settings, const Stopwatch& watch);
+                    RunSettings& settings, const Stopwatch& watch, KeptEdges* kept = nullptr);
 
 }  // namespace limn

@@ -171,14 +171,20 @@ EdgeSamplerInput make_sampler_input(const Scene& scene, int threads) {
   return input;
 }
 
-void add_light(const Scene& scene, EdgeSamplerInput& input) {
+void add_light(const Scene& scene, EdgeSamplerInput& input) { KeptEdges().add_light(scene, input); }
+
+void KeptEdges::add_light(const Scene& scene, EdgeSamplerInput& input) {
   const Lights lights(scene);
   for (const Light* light : lights.all()) light->add_triangles(input.lights);
   if (!scene.environment || scene.environment->is_uniform()) return;
+  if (same_environment_ && environment_) {
+    input.environment = environment_;
+    return;
+  }
   const auto brightness = [&](const Vec3d& d) {
     return std::max(0.0, luminance(scene.environment->radiance(d)));
   };
-  input.environment = std::make_shared<RadiancePyramid>(brightness, 8, 2);
+  input.environment = environment_ = std::make_shared<RadiancePyramid>(brightness, 8, 2);
 }
 
 static bool are_equal(const Tangents& a, const Tangents& b) {
@@ -225,8 +231,9 @@ EdgeSamplerInput KeptEdges::joined(EdgeSamplerInput moving) const {
 }
 
 EdgeSamplerInput KeptEdges::make(const Scene& scene, int threads) {
-  const bool known = is_known(scene);
   shared_ = nullptr;
+  if (!scene.exposure) return make_scene_edges(scene, threads);
+  const bool known = is_known(scene);
   if (!is_apart(scene, moving_)) return make_scene_edges(scene, threads);
   if (!known) {
     std::vector<bool> still = moving_;

@@ -17,11 +17,15 @@ EdgeSamplerInput make_scene_edges(const Scene& scene, int threads);
 void add_light(const Scene& scene, EdgeSamplerInput& input);
 
 // The edges of a scene at several times of the shutter: those of shapes that stand still are found
-// once.
+// once. Of a scene at the steps of a fit the environment over directions is kept.
 class KeptEdges {
  public:
   // As make_scene_edges(), of the scene at a time.
   EdgeSamplerInput make(const Scene& scene, int threads);
+  // As limn::add_light().
+  void add_light(const Scene& scene, EdgeSamplerInput& input);
+  // Whether the environment is the same in all scenes from now on.
+  void keep_environment(bool same) { same_environment_ = same; }
   // What samplers may keep of the input that make() returned last; null: nothing.
   SharedObjects* shared() { return shared_ ? &*shared_ : nullptr; }
 
@@ -41,6 +45,8 @@ class KeptEdges {
   Vec3d pinhole_;
   EdgeSamplerInput still_;  // without objects: unknown
   std::shared_ptr<SharedObjects> still_shared_, shared_;
+  bool same_environment_ = false;
+  std::shared_ptr<const RadiancePyramid> environment_;
 };
 
 // One for each pair of shapes that touch and move towards each other or apart (ContactLine); none

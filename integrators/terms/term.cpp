@@ -95,7 +95,7 @@ const EdgeSampler& TermInput::edge_sampler() {
   if (regions_) {
     regions_->add_rest(input);
   } else {
-    add_light(context.scene, input);
+    kept ? kept->add_light(context.scene, input) : add_light(context.scene, input);
   }
   edge_sampler_ = sampler.make(input, threads, kept ? kept->shared() : nullptr);
   edge_sampler_seconds_ = watch.seconds();
