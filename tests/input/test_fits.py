@@ -4,6 +4,8 @@
 """
 import json
 import os
+import pty
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -54,6 +56,36 @@ class FitsOfFunctions(unittest.TestCase):
             with open(os.path.join(folder, "at_truth", "fit.json")) as file:
                 # Targets are rounded to floats.
                 self.assertLess(json.load(file)["history"][0]["loss"], 1e-12)
+
+    # A person at a terminal reads an error on a line of its own, not behind half a line of progress.
+    def test_an_error_takes_the_line_of_progress_away(self):
+        with tempfile.TemporaryDirectory() as folder:
+            out = os.path.join(folder, "out")
+            scene = [os.path.join(ROOT, "scenes", "fits", "displacement.xml"), "-D", "width=8",
+                     "-D", "height=8"]  # fmt: skip
+            self.rows("displacement", folder, 1, "lbfgs")
+            scene += ["-D", f"mesh={folder}/stone.obj", "-D", "format=obj"]
+            words = [w for i in range(8) for w in ("--target", os.path.join(folder, f"stone_{i}.exr"))]
+            ours, theirs = pty.openpty()
+            fit = subprocess.Popen(
+                [LIMN, "fit", *scene, *words, "--wrt", "object.displacement", "--spp", "16",
+                 "--steps", "100000", "--snapshots", "20", "--no-report", "-o", out],
+                stdout=subprocess.DEVNULL, stderr=theirs)  # fmt: skip
+            os.close(theirs)
+            told = b""
+            while b"\rfit:" not in told:
+                told += os.read(ours, 4096)
+            shutil.rmtree(out)
+            try:
+                while part := os.read(ours, 4096):
+                    told += part
+            except OSError:  # the other end is closed
+                pass
+            self.assertEqual(fit.wait(), 2)
+            last = told.decode().rstrip().split("\r")[-1]
+            self.assertIn(out, last)
+            self.assertNotIn("fit:", last)
+            self.assertTrue(last.startswith("\x1b[K"), last)
 
 
 if __name__ == "__main__":

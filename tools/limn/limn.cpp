@@ -13,6 +13,7 @@
 #include "limn/core/names.h"
 #include "tools/limn/commands.h"
 #include "tools/limn/option_adder.h"
+#include "tools/limn/terminal.h"
 #include "tools/limn/version.h"
 
 namespace {
@@ -124,14 +125,17 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   use_huge_pages(argv);
+  std::string failed;
   try {
     return run(argc, argv);
   } catch (const limn::FieldError& error) {
-    fmt::print(stderr, "error: {}: {}\n", limn::option_name(error.field), error.message);
+    failed = fmt::format("error: {}: {}", limn::option_name(error.field), error.message);
   } catch (const limn::InputError& error) {
-    fmt::print(stderr, "{}\n", error.what());
+    failed = error.what();
   } catch (const std::exception& error) {
-    fmt::print(stderr, "error: {}\n", error.what());
+    failed = fmt::format("error: {}", error.what());
   }
+  limn::clear_progress();
+  fmt::print(stderr, "{}\n", failed);
   return limn::kBadInput;
 }
