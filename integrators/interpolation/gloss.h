@@ -8,8 +8,8 @@ namespace limn {
 
 class Gloss {
  public:
-  // alpha: roughness, which gives the exponent 2 / alpha^2 - 2. share: of the lobe's energy within
-  // the cap.
+  // alpha: roughness; the exponent is a quarter of that of its facets, 2 / alpha^2 - 2. share: of
+  // the lobe's energy within the cap.
   Gloss(const Environment& sky, double alpha, double share);
   // Radiance that is scattered to the viewer, of the region of the loops, which it changes.
   Rgb<double> radiance(const RadianceTables& tables, const Scattering<double>& scattering,
