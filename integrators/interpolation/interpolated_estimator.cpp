@@ -66,6 +66,12 @@ void check(const Scene& scene, const Choices& choices) {
   check_direct_light(scene, method);
   const SourceLocation whole{scene.file};
   if (!scene.camera.is_pinhole()) refuse_light(method, whole, "it needs a pinhole (use path)");
+  if (choices.shading == Shading::kAdaptive && choices.interpolate == Interpolate::kOutline) {
+    // Dark smudges at points on triangles' edges.
+    refuse_light(method, whole,
+                 "shading=adaptive is wrong with outlines: add interpolate=radiance, or choose "
+                 "shading=pixel");
+  }
   const Environment* sky = scene.environment.get();
   if (!sky) refuse_light(method, whole, "the scene has no environment to look at: add one");
   if (!sky->is_uniform() && !sky->grid()) {

@@ -66,15 +66,15 @@ inline std::vector<MethodType> other_methods() {
            .run = run_blurred},
           {.name = "interpolated",
            .description = "direct light of the sky on diffuse surfaces, from the exact outlines of "
-                          "the sky at vertices: fast and biased",
+                          "the sky at vertices: biased",
            .settings = {{"interpolate",
                          "between vertices: the outline, the radiance of three outlines, signed "
                          "distances from them, or nothing (exact outlines; rays to where the sky "
                          "is bright and open)",
                          {"outline", "radiance", "distances", "nothing", "rays"}},
                         {"shading",
-                         "points where light is evaluated: pixels' own, vertices, or as many of a "
-                         "triangle as the sky's detail asks for (adaptive)",
+                         "points where light is evaluated: pixels' own, vertices, or, of all but "
+                         "outlines, as many of a triangle as the sky's detail asks for (adaptive)",
                          {"pixel", "vertex", "adaptive"}},
                         {"subdivision",
                          "of adaptive shading: 2 to this times the light's change",

@@ -242,7 +242,7 @@ TEST(Interpolated, ImagesAreThoseOfLines) {
     const Image lines = image_of(scene, "lines", 64);
     for (const char* setting :
          {"", ":interpolate=radiance", ":interpolate=distances", ":interpolate=nothing",
-          ":interpolate=rays", ":shading=vertex", ":shading=adaptive"}) {
+          ":interpolate=rays", ":shading=vertex", ":interpolate=radiance:shading=adaptive"}) {
       const std::string method = std::string("interpolated") + setting;
       const double error = difference(image_of(scene, method), lines);
       fmt::print("{} {}: {:.4f} of the light differs\n", smooth ? "smooth" : "flat", method, error);
@@ -291,6 +291,9 @@ TEST(Interpolated, SaysWhatItDoesNotKnow) {
   const std::string mirror = square("mirror", 1, 0, {0, 1, 0}, conductor("m", 0.1));
   options.method = Method("interpolated:shading=vertex");
   EXPECT_NE(refused(over_floor(files, {}, false, kSky + mirror)).find("gloss is known of outlines"),
+            std::string::npos);
+  options.method = Method("interpolated:shading=adaptive");
+  EXPECT_NE(refused(over_floor(files, {}, false, kSky)).find("wrong with outlines"),
             std::string::npos);
   options.what = RenderWhat::kAmbientOcclusion;
   EXPECT_NE(refused(over_floor(files, {}, false, kSky)).find("knows radiance alone"),
