@@ -204,6 +204,13 @@ Rgb<double> RadianceColumns::sum(const Ends& ends) const {
   return {channel(0), channel(1), channel(2)};
 }
 
+RadianceColumns::Adjoint RadianceColumns::zero_adjoint() const {
+  const size_t cells = rows_ * stride_;
+  require_memory({}, static_cast<double>(cells) * sizeof(Adjoint::value_type),
+                 "the derivatives of the sums over the map", "use a smaller map");
+  return Adjoint(cells);
+}
+
 void RadianceColumns::add(const Ends& ends, const Rgb<double>& d_sum, Adjoint& adjoint) {
   const Colour all{d_sum.r, d_sum.g, d_sum.b, 0};
   for (size_t i = 0; i < ends.count; ++i) {

@@ -70,7 +70,7 @@ class RadianceColumns {
   // add(column, row, dLoss/dL) for all that was looked up.
   using Colour [[gnu::vector_size(32)]] = double;  // three, and padding
   using Adjoint = HugePageVector<std::array<Colour, 4>>;
-  Adjoint zero_adjoint() const { return Adjoint(rows_ * stride_); }
+  Adjoint zero_adjoint() const;  // InputError if it needs too much memory
   static void add(const Ends& ends, const Rgb<double>& d_sum, Adjoint& adjoint);
   void finish(Adjoint adjoint,
               const std::function<void(int, double, const Rgb<double>&)>& add) const;

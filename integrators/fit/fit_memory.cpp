@@ -14,7 +14,7 @@ namespace {
 constexpr int kCheckBlock = 8;     // pixels
 constexpr int kCheckSamples = 16;  // times those of the step
 
-// Of the sum of a weighted image: its blocks are independent, so that the root of the sum of their
+// Of the sum of a weighted image: its blocks are independent but for samples that pixels share, so that the root of the sum of their
 // squares is its standard error where the mean is 0.
 double z_of(const std::vector<double>& image, int width, int height) {
   double sum = 0, squares = 0;
@@ -37,12 +37,14 @@ void Fit::Impl::begin_memory() {
   }
   if (!options_.carry_images) {
     if (options_.check_steps == 0) return;
-    throw InputError("check_steps is for images that are carried on: ask for their memory, too");
+    throw InputError(
+        "check_steps is for images that are carried on: add --memory images (Python: "
+        "carry_images=True)");
   }
   if (is_exact() || over_faces()) {
     throw InputError(
         "the optimiser lbfgs and points over faces take one image, whose noise no step has to "
-        "carry: leave out the memory");
+        "carry: leave out --memory images (Python: carry_images)");
   }
   const LossOptions loss = loss_options();
   running_.assign(views.size(), RunningImages({.method = loss.method, .points = loss.points}));

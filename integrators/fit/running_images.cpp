@@ -2,6 +2,7 @@
 #include "integrators/fit/running_images.h"
 
 #include <algorithm>
+#include <numeric>
 
 #include "limn/core/error.h"
 #include "limn/core/rng.h"
@@ -78,7 +79,9 @@ bool RunningImages::carry(const Scene& scene, const RunSettings& settings) {
 }
 
 // With n, n' the noise of F now and before, and e that of I: the variance of n + b (e - n') is
-// least for b = cov(n, n') / (var(e) + var(n')). Each is half of what both chains are apart.
+// least for b = cov(n, n') / (var(e) + var(n')). Each is half of what both chains are apart. A
+// block's b is that of all others: one that followed its own errors, which are skewed where bright
+// samples are rare, would bias it.
 void RunningImages::find_shares(const ImagePair& before, const ImagePair& now) {
   std::vector<double> common(shares_.size()), all(shares_.size());
   for (size_t i = 0; i < now.a.size(); ++i) {
@@ -87,8 +90,11 @@ void RunningImages::find_shares(const ImagePair& before, const ImagePair& now) {
     common[block(i)] += n * m;
     all[block(i)] += e * e + m * m;
   }
+  const double total_common = std::accumulate(common.begin(), common.end(), 0.0);
+  const double total = std::accumulate(all.begin(), all.end(), 0.0);
   for (size_t k = 0; k < shares_.size(); ++k) {
-    shares_[k] = all[k] > 0 ? std::clamp(common[k] / all[k], 0.0, 1.0) : 0;
+    const double others = total - all[k];
+    shares_[k] = others > 0 ? std::clamp((total_common - common[k]) / others, 0.0, 1.0) : 0;
   }
 }
 

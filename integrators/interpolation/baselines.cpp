@@ -113,7 +113,8 @@ OpenSkyRays::OpenSkyRays(const Scene& scene, const RayTracer& tracer,
     for (int x = 0; x < film.crop_width; x += 2) {
       const auto start = camera.ray(film.crop_x + x + 0.5, film.crop_y + y + 0.5);
       Hit hit;
-      if (!tracer.closest(camera_ray(scene, start), hit)) continue;
+      const Ray ray = camera_ray(scene, start);
+      if (!is_traceable(ray) || !tracer.closest(ray, hit)) continue;
       const auto surface = surface_on_ray<double>(scene, hit.face, start.origin, start.direction);
       const Vec3d up = dot(surface.n_g, start.direction) < 0 ? surface.n_s : -surface.n_s;
       Rng rng(1, static_cast<uint64_t>(y), static_cast<uint64_t>(x));
@@ -132,7 +133,7 @@ OpenSkyRays::OpenSkyRays(const Scene& scene, const RayTracer& tracer,
       for (int k = 0; k < 4; ++k) {
         const auto l = scene.environment->radiance(
             direction(i + 0.25 + 0.5 * (k % 2), j + 0.25 + 0.5 * (k / 2), kSkyRows));
-        bright += luminance(l) + 1e-6;
+        bright += std::fabs(luminance(l)) + 1e-6;
       }
       const size_t map = cell_of(w, kMapRows);
       cells_.add(bright * solid_angle(cells_.size(), kSkyRows) * (floor + open[map]) /

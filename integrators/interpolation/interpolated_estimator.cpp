@@ -66,6 +66,17 @@ void check(const Scene& scene, const Choices& choices) {
   check_direct_light(scene, method);
   const SourceLocation whole{scene.file};
   if (!scene.camera.is_pinhole()) refuse_light(method, whole, "it needs a pinhole (use path)");
+  const bool meshless =
+      choices.interpolate == Interpolate::kRays || choices.interpolate == Interpolate::kNothing;
+  if (choices.shading != Shading::kPixel && meshless) {
+    refuse_light(method, whole,
+                 "interpolate=nothing and interpolate=rays evaluate light at pixels: choose "
+                 "shading=pixel");
+  }
+  if (choices.shading == Shading::kVertex && choices.interpolate != Interpolate::kOutline) {
+    refuse_light(method, whole,
+                 "shading=vertex interpolates light, nothing else: leave out interpolate");
+  }
   if (choices.shading == Shading::kAdaptive && choices.interpolate == Interpolate::kOutline) {
     // Dark smudges at points on triangles' edges.
     refuse_light(method, whole,
@@ -196,7 +207,8 @@ std::vector<SeenSide> InterpolatedEstimator::seen_sides() const {
       const auto start =
           camera_.ray(film.crop_x + (x + 0.5) / kLooks, film.crop_y + (y + 0.5) / kLooks);
       Hit hit;
-      if (!tracer_->closest(camera_ray(scene_, start), hit)) continue;
+      const Ray ray = camera_ray(scene_, start);
+      if (!is_traceable(ray) || !tracer_->closest(ray, hit)) continue;
       const SeenSide side = side_of(scene_, hit.face, start.direction);
       if (scene_.shape(hit.face.shape).bsdf->side(side.front)) found.emplace(side.key(), side);
     }

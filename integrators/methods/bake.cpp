@@ -352,7 +352,7 @@ Image BakedView::texel_adjoint(const SkyMap& sky, const Image& adjoint) const {
   }
   check_finite(adjoint, "", "the adjoint image");
   const Columns map(sky, lines_, 1);
-  RadianceColumns::Adjoint cells = map.sums.zero_adjoint();
+  RadianceColumns::Adjoint cells = map.sums.zero_adjoint();  // or InputError
   for (size_t pixel = 0; pixel < static_cast<size_t>(width_) * height_; ++pixel) {
     const auto channel = [&](int c) {
       return double{adjoint.data[pixel * adjoint.channels + (adjoint.channels == 3 ? c : 0)]};

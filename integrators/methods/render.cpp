@@ -88,7 +88,7 @@ void identify(BatchStore& store, const RenderOptions& options) {
   store.identify("what", kRenderWhat[static_cast<int>(options.what)]);
   if (method.by_lines) {
     store.identify("lines", fmt::format("{}, tolerance {}", options.lines, options.tolerance));
-  } else {
+  } else if (!method.make) {
     store.identify("rays", fmt::format("{}", options.rays));
   }
 }

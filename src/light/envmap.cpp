@@ -91,6 +91,7 @@ class MapEnvironment final : public Environment {
   std::shared_ptr<Environment> with_peaks() const {
     const auto copy = std::make_shared<MapEnvironment>(*this);
     copy->follows_ = EnvironmentMap::Follows::kPeaks;
+    copy->density();  // made now, not among the first samples
     return copy;
   }
   std::string describe() const override {

@@ -64,8 +64,8 @@ class RayTracer {
   // hit. Thread-safe. Throws UntraceableRay unless is_traceable(ray).
   virtual bool closest(const Ray& ray, Hit& hit) const = 0;
   virtual bool occluded(const Ray& ray) const = 0;
-  // Several rays take less time together. A ray's result does not depend on the others, but for
-  // which face it meets at an edge. It starts a few roundings of its origin above ray.start.
+  // The same for several rays, in less time. Results do not depend on other rays, but for the face
+  // met exactly at an edge. A ray starts above the face ray.start by a few roundings of its origin.
   static constexpr size_t kTogether = 8;
   virtual void closest_each(std::span<RayQuery> queries) const;
   virtual void occluded_each(std::span<RayQuery> queries) const;

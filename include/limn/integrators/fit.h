@@ -93,7 +93,7 @@ struct FitOptions {
   // Both images of the loss are carried on from step to step: their noise falls, for two more
   // images a step of loss_spp each. InputError for lbfgs and faces, which have no noise.
   bool carry_images = false;
-  int check_steps = 0;  // after so many steps a StepCheck is made; 0: never
+  int check_steps = 0;  // a StepCheck at the first step and every so many; 0: never
   int loss_spp = 0;     // samples per pixel of each of the two images of the loss; 0: settings.spp
   // Terms and where samples go; `parameters` is not looked at.
   BackwardOptions backward = [] {
@@ -105,7 +105,7 @@ struct FitOptions {
 
 inline constexpr const char* kMemory[] = {"none", "images"};
 
-// The images of a step against new ones of 16 times the samples: z-scores that are N(0, 1) where
+// The images of a step against new ones of 16 times the samples: z-scores that are about N(0, 1) where
 // the step's images have the mean that they should have.
 struct StepCheck {
   double brightness = 0;  // of the sum over all pixels
