@@ -207,11 +207,11 @@ TEST(RunningImages, AreNotForFitsWithoutNoise) {
   options.backward.points = FilmPoints::kFaces;
   Scene direct = lit_body(files);
   direct.max_depth = 2;
-  refused(direct, "leave out the memory");
+  refused(direct, "leave out --memory images");
   options = carrying();
   options.carry_images = false;
   options.check_steps = 2;
-  refused(direct, "ask for their memory");
+  refused(direct, "add --memory images");
 }
 
 }  // namespace

@@ -243,6 +243,7 @@ TEST(Interpolated, ImagesAreThoseOfLines) {
     for (const char* setting :
          {"", ":interpolate=radiance", ":interpolate=distances", ":interpolate=nothing",
           ":interpolate=rays", ":shading=vertex", ":interpolate=radiance:shading=adaptive"}) {
+      if (!smooth && *setting != 0) continue;
       const std::string method = std::string("interpolated") + setting;
       const double error = difference(image_of(scene, method), lines);
       fmt::print("{} {}: {:.4f} of the light differs\n", smooth ? "smooth" : "flat", method, error);
