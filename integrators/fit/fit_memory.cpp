@@ -14,8 +14,8 @@ namespace {
 constexpr int kCheckBlock = 8;     // pixels
 constexpr int kCheckSamples = 16;  // times those of the step
 
-// Of the sum of a weighted image: its blocks are independent but for samples that pixels share, so that the root of the sum of their
-// squares is its standard error where the mean is 0.
+// Of the sum of a weighted image: its blocks are independent, but for samples that pixels share, so
+// that the root of the sum of their squares is its standard error where the mean is 0.
 double z_of(const std::vector<double>& image, int width, int height) {
   double sum = 0, squares = 0;
   for (const double x : sum_blocks(image, width, height, kCheckBlock)) {

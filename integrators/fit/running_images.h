@@ -2,10 +2,10 @@
 // Images that a fit carries from step to step, in place of new ones: recursive control variates
 // (Nicolet et al. 2023, "Recursive Control Variates for Inverse Rendering"),
 //   I_t = F(theta_t; s) + b (I_{t-1} - F(theta_{t-1}; s)),
-// F: an image by few samples, s: their seed, new at each step. For steps theta_t that are given, the
-// mean of I_t is the image, as b of a block of pixels follows from the other blocks: from noise, and
-// how much of it the difference of both F has left. Where theta_t follows from I_{t-1}, as in a fit,
-// this holds about. b is 0 where nothing is known.
+// F: an image by few samples, s: their seed, new at each step. For steps theta_t that are given,
+// the mean of I_t is the image, as b of a block of pixels follows from the other blocks: from
+// noise, and how much of it the difference of both F has left. Where theta_t follows from I_{t-1},
+// as in a fit, this holds about. b is 0 where nothing is known.
 // Noise lasts for about 1 / (1 - b) steps. Its sum over many steps is no less than that of new
 // images F: steps that average gradients, as Adam's momentum does, gain little.
 #include <cstdint>

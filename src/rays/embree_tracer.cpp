@@ -437,8 +437,8 @@ class EmbreeTracer final : public RayTracer {
     }
   }
   // Whether rays go side by side, as a camera's and those to a lamp without extent do: a packet
-  // then descends Embree's tree as one, which takes 0.4 of the time and finds the same hits, but for
-  // which face a ray meets exactly at an edge. Others would take 1.4 of it. Not tuned.
+  // then descends Embree's tree as one, which takes 0.4 of the time and finds the same hits, but
+  // for which face a ray meets exactly at an edge. Others would take 1.4 of it. Not tuned.
   bool go_side_by_side(std::span<const RayQuery> queries) const {
     constexpr double kCosine = 0.99, kShare = 1.0 / 64;  // of the scene's size, for their origins
     const Ray& first = queries.front().ray;

@@ -105,8 +105,8 @@ struct FitOptions {
 
 inline constexpr const char* kMemory[] = {"none", "images"};
 
-// The images of a step against new ones of 16 times the samples: z-scores that are about N(0, 1) where
-// the step's images have the mean that they should have.
+// The images of a step against new ones of 16 times the samples: z-scores, about N(0, 1) where the
+// step's images have the mean that they should have.
 struct StepCheck {
   double brightness = 0;  // of the sum over all pixels
   double target = 0;  // of the sum weighted by the loss's derivative: do they lean to the target
