@@ -5,7 +5,6 @@
 #include <cmath>
 #include <utility>
 
-#include "integrators/backward/steps.h"
 #include "integrators/methods/render_seeds.h"
 #include "limn/core/error.h"
 #include "limn/core/image.h"
@@ -197,32 +196,6 @@ std::string bias_warning(LossKind kind) {
       kLosses[static_cast<int>(kind)]);
 }
 
-LossResult pair_loss(const Scene& scene, const Image& target, const LossOptions& options,
-                     const ImagePair& pair, const Image& mask) {
-  const size_t values = pair.a.size();
-  Level finest{target.width, target.height, pixel_weights(scene, mask), pair.a, pair.b, {}};
-  for (size_t i = 0; i < values; ++i) {
-    finest.target.push_back(target.channels == 3 ? target.data[i] : target.data[i / 3]);
-  }
-  LossResult result;
-  std::vector<double> adjoint(values);
-  Level level = finest;
-  for (int k = 0; k < options.levels; ++k) {
-    if (k > 0) level = halved(level);
-    add_level(level, finest, k, options, result.value, adjoint);
-  }
-  result.adjoint = Image(target.width, target.height, 3);
-  double variance = 0;
-  for (size_t i = 0; i < values; ++i) {
-    result.adjoint.data[i] = static_cast<float>(adjoint[i]);
-    // To first order, with half of the adjoint for each image.
-    const double slope = 0.5 * adjoint[i];
-    variance += slope * slope * pair.variances[i];
-  }
-  result.error = std::sqrt(variance);
-  return result;
-}
-
 LossResult image_loss(const Scene& scene, const Image& target, const LossOptions& options,
                       const RunSettings& settings, const Image& mask) {
   check_loss_images(scene, target, mask);
@@ -238,18 +211,35 @@ LossResult image_loss(const Scene& scene, const Image& target, const LossOptions
   const auto rendered =
       render_seeds(scene, settings, seeds, {.method = options.method, .points = options.points});
   const RenderResult &a = rendered.front(), &b = rendered.back();
+  LossResult result;
+  result.spp = std::min(a.spp, b.spp);
   if (a.non_finite.count + b.non_finite.count > 0) {
     throw InputError("loss: " + (a.non_finite.count > 0 ? a : b).non_finite.message());
   }
-  const int64_t spp = std::min(a.spp, b.spp);
-  if (spp == 0) return {};
-  ImagePair pair{means(a.radiance), means(b.radiance), {}};
-  for (size_t i = 0; i < pair.a.size(); ++i) {
-    const double both = a.radiance.variance(i) + b.radiance.variance(i);
-    pair.variances.push_back(options.one_image() ? 2 * both : both);
+  if (result.spp == 0) return result;
+  const size_t values = a.radiance.size();
+  Level finest{target.width, target.height, pixel_weights(scene, mask), {}, {}, {}};
+  for (size_t i = 0; i < values; ++i) {
+    finest.a.push_back(a.radiance.mean(i));
+    finest.b.push_back(b.radiance.mean(i));
+    finest.target.push_back(target.channels == 3 ? target.data[i] : target.data[i / 3]);
   }
-  LossResult result = pair_loss(scene, target, options, pair, mask);
-  result.spp = spp;
+  std::vector<double> adjoint(values);
+  Level level = finest;
+  for (int k = 0; k < options.levels; ++k) {
+    if (k > 0) level = halved(level);
+    add_level(level, finest, k, options, result.value, adjoint);
+  }
+  result.adjoint = Image(target.width, target.height, 3);
+  double variance = 0;
+  for (size_t i = 0; i < values; ++i) {
+    result.adjoint.data[i] = static_cast<float>(adjoint[i]);
+    // To first order, with half of the adjoint for each image.
+    const double slope = 0.5 * adjoint[i];
+    const double both = a.radiance.variance(i) + b.radiance.variance(i);
+    variance += slope * slope * (options.one_image() ? 2 * both : both);
+  }
+  result.error = std::sqrt(variance);
   return result;
 }
 

@@ -226,7 +226,7 @@ void RadianceColumns::add(const Ends& ends, const Rgb<double>& d_sum, Adjoint& a
 
 void RadianceColumns::finish(
     Adjoint adjoint, const std::function<void(int, double, const Rgb<double>&)>& add) const {
-  // Of the integrals up to the next row, and of radiance there.
+  // Derivatives with respect to both integrals up to the next row, and to the radiance there.
   struct Next {
     Colour pole{}, across{}, radiance{};
   };

@@ -24,7 +24,7 @@ class KeptEdges {
   EdgeSamplerInput make(const Scene& scene, int threads);
   // As limn::add_light().
   void add_light(const Scene& scene, EdgeSamplerInput& input);
-  // Whether the environment is the same in all scenes from now on.
+  // same: all scenes from now on have one environment, whose importances are then made once.
   void keep_environment(bool same) { same_environment_ = same; }
   // What samplers may keep of the input that make() returned last; null: nothing.
   SharedObjects* shared() { return shared_ ? &*shared_ : nullptr; }

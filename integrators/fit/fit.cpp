@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "integrators/backward/steps.h"
 #include "integrators/fit/fit_impl.h"
 #include "integrators/methods/faces_estimator.h"
 #include "integrators/methods/hair_gaps.h"
@@ -133,7 +134,7 @@ Fit::Impl::Impl(std::vector<FitView> all, const FitOptions& options, const RunSe
   check_terms();
   if (is_exact()) check_exact();
   check_blur();
-  begin_memory();
+  keep_skies();
   if (!options.remesh.empty()) check_remeshing();
   // As it is before the first step; views differ in little but the camera.
   if (!over_faces()) {
@@ -214,6 +215,16 @@ void Fit::Impl::check_terms() const {
 }
 
 // What would fail after hours is reported at once.
+void Fit::Impl::keep_skies() {
+  for (size_t v = 0; v < views.size(); ++v) {
+    const std::string& sky = views[v].scene.environment_id;
+    const auto moves_sky = [&](const FitParameter& p) {
+      return p.in_view(v) && !sky.empty() && p.name().starts_with(sky + ".");
+    };
+    kept_.emplace_back().keep_environment(std::ranges::none_of(parameters_, moves_sky));
+  }
+}
+
 void Fit::Impl::check_remeshing() {
   bool any = false;
   for (const FitParameter& p : parameters_) {
@@ -268,10 +279,14 @@ bool Fit::Impl::add_view(size_t view, FitRecord& record,
                          std::vector<std::vector<double>>& gradients) {
   const FitView& v = views[view];
   const double share = 1 / static_cast<double>(views.size());
-  RunSettings own = loss_settings(view);
-  LossResult loss = loss_of(view, own);
+  RunSettings own = view_settings(view);
+  own.spp = samples_of(options_.loss_spp > 0 ? options_.loss_spp : settings_.spp);
+  const LossOptions loss_options{
+      options_.loss, options_.pyramid,
+      options_.blur.particles ? Method("light-traced") : loss_method(options_.backward.method),
+      options_.backward.points, is_exact()};
+  LossResult loss = image_loss(v.scene, v.target, loss_options, own, v.mask);
   if (loss.spp < own.spp) return false;
-  if (is_checked() && !add_check(view, own, record)) return false;
   record.view_losses.push_back(loss.value);
   record.loss += share * loss.value;
   record.error = std::hypot(record.error, share * loss.error);
@@ -328,13 +343,11 @@ std::optional<FitRecord> Fit::Impl::step() {
   record.step_size *= shrunk();
   std::vector<std::vector<double>> gradients;
   if (!evaluate(record, gradients)) return std::nullopt;
-  const auto before = options_.carry_images ? std::optional(state()) : std::nullopt;
   for (size_t i = 0; i < parameters_.size(); ++i) {
     record.halvings = std::max(record.halvings,
                                parameters_[i].move(gradients[i], record.step_size, steps, views));
   }
   finish_step(record);
-  if (before && !carry_images(*before)) return std::nullopt;
   record.seconds = watch.seconds();
   return record;
 }
@@ -383,7 +396,7 @@ FitState Fit::Impl::state() const {
   for (size_t v = 0; v < views.size(); ++v) {
     const Scene& scene = views[v].scene;
     FitState::View view{camera_numbers(scene.camera),           {}, {}, {},
-                        course_numbers(scene, moved_shapes(v)), {}, {}};
+                        course_numbers(scene, moved_shapes(v)), {}};
     for (const ShapeId s : moved_shapes(v)) {
       const Mesh& mesh = scene.shape(s).mesh;
       view.shapes.push_back({std::vector<Vec3f>(mesh.positions), std::vector<Vec3d>(mesh.normals),
@@ -398,7 +411,6 @@ FitState Fit::Impl::state() const {
       const std::vector<float> texels = map->texels().data;
       view.texels.insert(view.texels.end(), texels.begin(), texels.end());
     }
-    if (!running_.empty()) view.images = running_[v].numbers();
     state.views.push_back(std::move(view));
   }
   return state;
@@ -447,8 +459,6 @@ void Fit::Impl::check_state(const FitState& state) const {
     size_t texels = 0;
     for (const TexelMap* map : texel_maps(v)) texels += map->texels().data.size();
     check(view.texels.size() == texels);
-    check(running_.empty() ? view.images.empty()
-                           : RunningImages::fits(view.images.size(), views[v].scene));
   }
 }
 
@@ -505,7 +515,6 @@ void Fit::Impl::put(const FitState& state) {
     for (Vec3d* p : course_points(scene, shapes)) {
       for (int k = 0; k < 3; ++k) (*p)[k] = *number++;
     }
-    if (!running_.empty()) running_[v].restore(view.images, scene);
   }
   for (size_t i = 0; i < parameters_.size(); ++i) {
     parameters_[i].restore(state.parameters[i], views, remeshed[i]);

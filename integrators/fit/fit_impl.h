@@ -9,9 +9,9 @@
 #include <utility>
 #include <vector>
 
+#include "integrators/edges/scene_edges.h"
 #include "integrators/fit/fit_parameter.h"
 #include "integrators/fit/quasi_newton.h"
-#include "integrators/fit/running_images.h"
 #include "limn/integrators/fit.h"
 
 namespace limn {
@@ -63,20 +63,10 @@ class Fit::Impl {
   // The loss is a function of the parameters: all steps take the same samples.
   bool is_exact() const { return options_.optimiser == OptimiserKind::kLbfgs; }
   bool over_faces() const { return options_.backward.points == FilmPoints::kFaces; }
+  // Importances of skies that no parameter changes are made once.
+  void keep_skies();
   // Per pixel, of this step, if there were so many at the first one.
   int samples_of(int first) const;
-  // In fit_memory.cpp.
-  void begin_memory();
-  LossOptions loss_options() const;
-  RunSettings loss_settings(size_t view) const;
-  // Without samples: interrupted.
-  LossResult loss_of(size_t view, const RunSettings& settings);
-  bool is_checked() const { return options_.check_steps > 0 && steps % options_.check_steps == 0; }
-  // False: interrupted. settings: those of the view's loss.
-  bool add_check(size_t view, const RunSettings& settings, FitRecord& record);
-  // After a step, whose beginning is gone back to where this is interrupted (false) or throws.
-  bool carry_images(const FitState& before);
-
   // In fit_blurred.cpp.
   void check_blur() const;
   Blur blur() const;  // of this step; sigma 0: the gradient is that of sharp faces
@@ -122,8 +112,7 @@ class Fit::Impl {
   FitOptions options_;
   RunSettings settings_;
   std::vector<FitParameter> parameters_;
-  std::vector<KeptEdges> kept_;         // of each view
-  std::vector<RunningImages> running_;  // of each view; empty: images are not carried on
+  std::vector<KeptEdges> kept_;  // of each view
   QuasiNewton quasi_newton_;
   std::optional<Iterate> here_;  // of the parameters as they are, if known
 };

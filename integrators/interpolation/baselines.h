@@ -1,5 +1,5 @@
 #pragma once
-// What the interpolation is compared with: signed distances from the outline (after Wang et al.
+// Methods that interpolation is compared with: signed distances from the outline (after Wang et al.
 // 2009), and rays drawn where the sky is bright and open (after Bashford-Rogers et al. 2013).
 #include <vector>
 
@@ -14,10 +14,10 @@ namespace limn {
 
 class SignedDistances {
  public:
-  // Of all vertices of the mesh.
+  // Makes the distances of all vertices of the mesh.
   SignedDistances(const Environment& sky, const SkyMesh& mesh, const Contours& contours,
                   int threads);
-  // Irradiance.
+  // The irradiance at a point of a triangle, whose normal is n.
   Rgb<double> light(const SkyMesh& mesh, const SkyMesh::Spot& spot, const Vec3d& n) const;
 
  private:

@@ -32,7 +32,8 @@ struct Group {
   bool crosses(const Indices& at, const Indices* own) const;
   // Drops pairs that other items hold.
   void drop_repeated();
-  // Whether the rules allow it; `same` is then the item that it completes or repeats, if any.
+  // Whether the rules allow an item of these corners. Then `same` is the item that it completes or
+  // repeats, if there is one.
   bool allows(const Indices& at, int& same) const;
 };
 
@@ -92,7 +93,8 @@ class Match {
   struct Place {
     int group = -1, index = 0;
   };
-  // Of the corner of a vertex; group -1: it is in none, or another vertex's.
+  // The group of a corner of vertex k, and its index there. The group is -1 if it is in none, or if
+  // the corner is another vertex's.
   Place place(int k, uint32_t corner) const {
     return corner < offsets_[k + 1] - offsets_[k] ? places_[offsets_[k] + corner] : Place{};
   }

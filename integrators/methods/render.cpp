@@ -178,25 +178,17 @@ RenderResult render(const Scene& scene, const RunSettings& requested,
   return result;
 }
 
-SeedImages::SeedImages(Scene scene, const RunSettings& settings, const RenderOptions& options)
-    : options_(options), scene_(std::move(scene)) {
-  CHECK(!options.method->image->looks_around);
-  if (is_moving(scene_)) share_between_times(scene_, settings.threads);
-  estimators_ = estimators_of(scene_, settings, options_);
-}
-
-RenderResult SeedImages::render(const RunSettings& settings) const {
-  RunSettings own = settings_for(options_.points, settings);
-  own.store = nullptr;
-  return run(scene_, estimators_, own, Stopwatch(), options_);
-}
-
 std::vector<RenderResult> render_seeds(const Scene& scene, const RunSettings& settings,
                                        std::span<const uint64_t> seeds,
                                        const RenderOptions& options) {
+  // The estimators of others hold their seed.
+  CHECK(!options.method->image->looks_around);
   const Stopwatch watch;
-  RunSettings own = settings;
-  const SeedImages images(scene, own, options);
+  RunSettings own = settings_for(options.points, settings);
+  own.store = nullptr;
+  const std::optional<Scene> shared = shared_by_times(scene, own.threads);
+  const Scene& start = shared ? *shared : scene;
+  const EstimatorList estimators = estimators_of(start, own, options);
   if (own.seconds > 0) {
     const double setup = watch.seconds() / static_cast<double>(seeds.size());
     own.seconds = std::max(1e-9, settings.seconds - setup);
@@ -204,7 +196,7 @@ std::vector<RenderResult> render_seeds(const Scene& scene, const RunSettings& se
   std::vector<RenderResult> results;
   for (const uint64_t seed : seeds) {
     own.seed = seed;
-    results.push_back(images.render(own));
+    results.push_back(run(start, estimators, own, Stopwatch(), options));
   }
   return results;
 }

@@ -431,5 +431,38 @@ TEST(Fit, QuasiNewtonRemeshesBeforeItRests) {
   }
 }
 
+// Importances of the sky are kept from step to step, but not where a fit changes it.
+TEST(Fit, AFitThatMovesTheSkyDrawsByTheNewOne) {
+  const TempFiles files;
+  SceneParts parts;
+  parts.width = parts.height = 12;
+  parts.origin = {0, 2, 4};
+  Image map(8, 4, 3);
+  for (size_t i = 0; i < map.data.size(); ++i) map.data[i] = 0.1f * static_cast<float>(i % 11);
+  write_exr(files.path("map.exr"), map, false, {});
+  const std::string mesh = write_mesh(files, "body.obj", icosphere_mesh(1));
+  parts.body = obj_shape("body", mesh, false, 0.6, {0, 0.9, 0}, diffuse("clay", ".6, .5, .4")) +
+               square("floor", 2.5, -90, {0, 0, 0}, diffuse("grey", ".5, .5, .5")) +
+               R"(<emitter type="envmap" id="sky"><string name="filename" value=")" +
+               files.path("map.exr") + R"("/></emitter>)";
+  Image target(12, 12, 3);
+  for (size_t i = 0; i < target.data.size(); ++i) target.data[i] = 0.1f * (i % 7);
+  const std::vector<FitView> views{{make_scene(files, parts), target, {}}};
+  RunSettings settings;
+  settings.spp = 2;
+  for (const char* sky : {"sky.data", "sky.scale"}) {
+    FitOptions options;
+    options.parameters = {"body.vertex_positions", sky};
+    options.step = 20;
+    Fit whole(views, options, settings), other(views, options, settings);
+    ASSERT_TRUE(whole.step());
+    other.restore(whole.state());
+    ASSERT_TRUE(whole.step() && other.step());
+    EXPECT_EQ(whole.state().views[0].shapes[0].positions,
+              other.state().views[0].shapes[0].positions)
+        << sky;
+  }
+}
+
 }  // namespace
 }  // namespace limn

@@ -42,8 +42,7 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ViewArguments, scene, defines, sensor, target
                                    fingerprints)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FitState::Numbers, values, first, second, natural_step, lambda)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FitState::Shape, positions, normals, faces)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FitState::View, camera, shapes, pivots, values, courses, texels,
-                                   images)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FitState::View, camera, shapes, pivots, values, courses, texels)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FitState, steps, parameters, moves, changes, views)
 
 namespace {
@@ -51,7 +50,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-constexpr int kFormat = 9;                  // of fit.json and state.cbor
+constexpr int kFormat = 8;                  // of fit.json and state.cbor
 constexpr size_t kDistanceSamples = 10000;  // on each surface; not tuned
 
 // Calls visit(name, member) for what is no row of the table of options: reading and writing go over
@@ -331,7 +330,6 @@ void FitFolder::add(const FitRecord& r, const Fit& fit) {
                       {"at_rest", r.at_rest},
                       {"values", scalars},
                       {"seconds", r.seconds}});
-  if (r.check) history_.back()["check"] = {r.check->brightness, r.check->target};
 }
 
 json FitFolder::mesh_figures(const Shape& s, const std::string& name, int threads) const {
@@ -367,13 +365,6 @@ void FitFolder::print_snapshot(const Fit& fit, const json& meshes) {
   add("std. error", 10, figure(last, "stderr", FMT_STRING("{:.1g}")));
   if (arguments_.options.blur_steps > 0)
     add("sigma", 10, figure(last, "sigma", FMT_STRING("{:.3g}")));
-  if (arguments_.options.check_steps > 0) {
-    json check(2, nullptr);
-    for (const json& record : history_) check = record.value("check", check);
-    const json named = {{"brightness", check[0]}, {"target", check[1]}};
-    add("z: brightness", 0, figure(named, "brightness", FMT_STRING("{:.2f}")));
-    add("z: target", 0, figure(named, "target", FMT_STRING("{:.2f}")));
-  }
   for (const FitScalar& s : fit.scalars()) add(s.name, 12, fmt::format("{:.6g}", s.value));
   for (const json& mesh : meshes) {
     const std::string shape = mesh.at("shape").get<std::string>();

@@ -200,15 +200,6 @@ void bind_record(nb::module_& m) {
           "at_rest", &FitRecord::at_rest,
           "Of lbfgs: no lower loss was found, nothing was moved, and no remeshing is left. Where "
           "one is, the fit goes on to it at once, and steps with it.")
-      .def_prop_ro(
-          "check",
-          [](const FitRecord& r) -> nb::object {
-            if (!r.check) return nb::none();
-            return nb::make_tuple(r.check->brightness, r.check->target);
-          },
-          nb::sig("def check(self) -> tuple[float, float] | None"),
-          "With check_steps: z-scores of the carried images against new ones, of their sum and of "
-          "the sum weighted by the loss's derivative.")
       .def_ro("seconds", &FitRecord::seconds)
       .def("__repr__", [](const FitRecord& r) {
         return fmt::format("<limn.FitRecord: step {}, loss {:.4g} +- {:.2g}>", r.step, r.loss,

@@ -90,26 +90,13 @@ struct FitOptions {
   int blur_steps = 0;
   Blur blur;
   double sigma_end = 0;
-  // Both images of the loss are carried on from step to step: their noise falls, for two more
-  // images a step of loss_spp each. InputError for lbfgs and faces, which have no noise.
-  bool carry_images = false;
-  int check_steps = 0;  // a StepCheck at the first step and every so many; 0: never
-  int loss_spp = 0;     // samples per pixel of each of the two images of the loss; 0: settings.spp
+  int loss_spp = 0;  // samples per pixel of each of the two images of the loss; 0: settings.spp
   // Terms and where samples go; `parameters` is not looked at.
   BackwardOptions backward = [] {
     BackwardOptions own;
     own.method = Method(Task::kFit);
     return own;
   }();
-};
-
-inline constexpr const char* kMemory[] = {"none", "images"};
-
-// The images of a step against new ones of 16 times the samples: z-scores, about N(0, 1) where the
-// step's images have the mean that they should have.
-struct StepCheck {
-  double brightness = 0;  // of the sum over all pixels
-  double target = 0;  // of the sum weighted by the loss's derivative: do they lean to the target
 };
 
 // One step.
@@ -128,7 +115,6 @@ struct FitRecord {
   // Of kLbfgs: no lower loss was found, nothing was moved, and no remeshing is left. Where one is,
   // the fit goes on to it at once, and steps() with it.
   bool at_rest = false;
-  std::optional<StepCheck> check;
   std::vector<double> values;  // of Fit::scalars(), after the step
   double seconds = 0;
 };
@@ -166,7 +152,6 @@ struct FitState {
     std::vector<double> courses;
     // H by W by 3 each, of the maps that motions without values move.
     std::vector<float> texels;
-    std::vector<double> images;  // that are carried on (fit/running_images.h); empty: none
   };
   std::vector<View> views;
 };

@@ -124,18 +124,6 @@ void visit_options(Like<FitOptions> auto& o, auto&& visit) {
                            1, 1 << 30}
                         .or_zero("`spp`")
                         .samples());
-  visit(o.carry_images,
-        choice("memory", kMemory,
-               "What steps keep of earlier ones: nothing, or the images of the loss, which "
-               "differences of two images carry on, so that they have less noise")
-            .with(&Option::flag, "carry_images")
-            .samples());
-  visit(o.check_steps, Option{"check_steps",
-                              "Every so many steps, compare the images of the loss with new ones "
-                              "of 16 times the samples: z-scores",
-                              1, 1 << 30}
-                           .or_zero("never")
-                           .samples());
   visit(o.spp_doubling,
         Option{"spp_doubling", "Double the samples per pixel every so many steps", 1, 1 << 30}
             .or_zero("never")

@@ -26,7 +26,7 @@ struct ImageMethod {
   bool by_lines = false;       // between silhouettes
   bool uniform_lines = false;  // through a map at equal azimuths
   bool from_lights = false;    // also particles, see light_traced_estimator.h
-  // What samples the pixels, for a method with an estimator of its own: of direct light, biased.
+  // Makes the estimator of a method that has its own, for biased images of direct light.
   std::unique_ptr<SampleEstimator> (*make)(const Scene&, const RunSettings&,
                                            const Settings&) = nullptr;
 };
