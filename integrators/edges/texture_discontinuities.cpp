@@ -193,7 +193,7 @@ void TextureDiscontinuities::look_at(const Scene& scene, ShapeId id) {
   }
   result.has_seams = seams.everywhere || seams.coordinates || !seams.sides.empty();
   if (textures.empty()) return;
-  if (mesh.uv_source != UvSource::kPlane && !seams.period_one) with_meridian_.push_back(id);
+  if (!is_linear(mesh.uv_source) && !seams.period_one) with_meridian_.push_back(id);
   seams.sides.resize(mesh.faces.size());
   for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
     if (add_face(textures, mesh, FaceId(f), result)) continue;
@@ -258,7 +258,7 @@ void check_texture_edges(const Scene& scene, std::vector<std::string>& warnings)
 
 bool add_face_discontinuities(const Texture& texture, const Mesh& mesh, FaceId face, size_t most,
                               Texture::Discontinuities& lines) {
-  if (mesh.uv_source != UvSource::kPlane) return CurvedFace(texture, mesh, face, most, lines).add();
+  if (!is_linear(mesh.uv_source)) return CurvedFace(texture, mesh, face, most, lines).add();
   const FaceIndices& ids = mesh.uv_ids[face.index()];
   std::array<Pair, 3> uv;
   for (int k = 0; k < 3; ++k) {

@@ -122,7 +122,7 @@ class RadianceBeside {
     walks_[i].edge = &edges_[i];
     SurfacePoint<double> surface = surface_on_ray(scene_, side.face, view_.y, n);
     if (const Mesh& mesh = surface.shape->mesh; mesh.textured) {
-      const bool curved = of_texture_ && mesh.uv_source != UvSource::kPlane;
+      const bool curved = of_texture_ && !is_linear(mesh.uv_source);
       step_aside(corners, side.into, curved ? 4 * kOffCurve : 0x1p-21, surface.b);
     }
     start(i, surface);

@@ -31,8 +31,11 @@ class Dielectric final : public BothScalars<Dielectric, SmoothBorder> {
 std::shared_ptr<Bsdf> read_dielectric(Properties& properties) {
   const double eta = read_relative_ior(properties, "bk7");
   if (properties.smooth_as() > 0 && eta != 1) {
-    return make_roughdielectric({RoughConductorValues::Distribution::kGgx, properties.smooth_as(),
-                                 eta, read_reflectance(properties, "specular_reflectance", 1),
+    return make_roughdielectric({RoughConductorValues::Distribution::kGgx,
+                                 properties.smooth_as(),
+                                 {},
+                                 eta,
+                                 read_reflectance(properties, "specular_reflectance", 1),
                                  read_reflectance(properties, "specular_transmittance", 1)});
   }
   return read_smooth_border<Dielectric>("dielectric", properties, eta);

@@ -17,6 +17,7 @@
 namespace limn {
 namespace {
 
+using microfacet::AnisotropicFacets;
 using microfacet::Distribution;
 using microfacet::Facets;
 using microfacet::kMaximumAlpha;
@@ -32,8 +33,8 @@ struct Facet {
   S d;
   bool above, possible;  // possible: some facet scatters so
 
-  Facet(const Facets<S>& facets, const Vec3<S>& n, const Vec3<S>& wi, const Vec3<S>& wo,
-        const S& eta)
+  template <class F>
+  Facet(const F& facets, const Vec3<S>& n, const Vec3<S>& wi, const Vec3<S>& wo, const S& eta)
       : cos_i(dot(n, wi)), cos_o(dot(n, wo)), above(value(cos_o) > 0) {
     possible = value(cos_i) > 0 && value(cos_o) != 0;
     if (!possible) return;
@@ -51,7 +52,9 @@ class RoughDielectric final : public BothScalars<RoughDielectric> {
  public:
   explicit RoughDielectric(const RoughDielectricValues& v)
       : distribution_(v.distribution),
-        alpha_(number("alpha", v.alpha)),
+        alpha_(number(v.alpha_v ? "alpha_u" : "alpha", v.alpha)),
+        alpha_v_(v.alpha_v ? number("alpha_v", *v.alpha_v) : BsdfNumber{}),
+        tangent_(v.alpha_v ? add_tangent("alpha_u") : -1),
         eta_(v.eta),
         specular_reflectance_(colour("specular_reflectance", v.specular_reflectance)),
         specular_transmittance_(colour("specular_transmittance", v.specular_transmittance)) {
@@ -60,23 +63,25 @@ class RoughDielectric final : public BothScalars<RoughDielectric> {
   }
 
   bool is_constant() const override {
-    return limn::is_constant(alpha_.constant) && limn::is_constant(eta_) &&
-           limn::is_constant(specular_reflectance_.constant) &&
+    return limn::is_constant(alpha_.constant) && limn::is_constant(alpha_v_.constant) &&
+           limn::is_constant(eta_) && limn::is_constant(specular_reflectance_.constant) &&
            limn::is_constant(specular_transmittance_.constant);
   }
   std::vector<ParameterRef> parameters() override {
     std::vector<ParameterRef> list;
     list.push_back({"eta", {&eta_}, ParameterRef::Unit::kValue, kLeastIor, kMostIor});
-    add_parameter("alpha", alpha_, 0, kMaximumAlpha, list);
+    add_parameter(is_anisotropic() ? "alpha_u" : "alpha", alpha_, 0, kMaximumAlpha, list);
+    if (is_anisotropic()) add_parameter("alpha_v", alpha_v_, 0, kMaximumAlpha, list);
     add_parameter("specular_reflectance", specular_reflectance_, 0, 1, list);
     add_parameter("specular_transmittance", specular_transmittance_, 0, 1, list);
     return list;
   }
   std::string describe() const override {
     return fmt::format(
-        "roughdielectric, {}, alpha {}, eta {:g}, specular_reflectance {}, specular_transmittance "
-        "{}",
-        is_ggx() ? "ggx" : "beckmann", text_of(alpha_), eta_.v, text_of(specular_reflectance_),
+        "roughdielectric, {}, alpha {}{}, eta {:g}, specular_reflectance {}, "
+        "specular_transmittance {}",
+        is_ggx() ? "ggx" : "beckmann", text_of(alpha_),
+        is_anisotropic() ? " by " + text_of(alpha_v_) : "", eta_.v, text_of(specular_reflectance_),
         text_of(specular_transmittance_));
   }
 
@@ -86,14 +91,23 @@ class RoughDielectric final : public BothScalars<RoughDielectric> {
 
  private:
   bool is_ggx() const { return distribution_ == Distribution::kGgx; }
+  bool is_anisotropic() const { return tangent_ >= 0; }
   template <class S>
-  S alpha(const Rgb<S>* at) const {
-    const S a = alpha_.of(at);
+  static S alpha(const BsdfNumber& number, const Rgb<S>* at) {
+    const S a = number.of(at);
     return value(a) > kMinimumAlpha ? a : S(kMinimumAlpha);
   }
-  template <class S>
-  Facets<S> facets(const Rgb<S>* at) const {
-    return {distribution_, alpha(at)};
+  double largest_alpha(const Rgb<double>* at) const {
+    return std::max(alpha(alpha_, at), is_anisotropic() ? alpha(alpha_v_, at) : 0);
+  }
+  // f(facets), of either kind.
+  template <class S, class Function>
+  std::invoke_result_t<Function, Facets<S>> with_facets(const Vec3<S>& n, const Rgb<S>* at,
+                                                        const Function& f) const {
+    if (!is_anisotropic()) return f(Facets<S>{distribution_, alpha(alpha_, at)});
+    const Rgb<S> tangent = at ? at[tangent_] : Rgb<S>{};
+    return f(AnisotropicFacets<S>(distribution_, alpha(alpha_, at), alpha(alpha_v_, at), n,
+                                  Vec3<S>{tangent.r, tangent.g, tangent.b}));
   }
   template <class S>
   S eta_of(bool front) const {
@@ -107,17 +121,22 @@ class RoughDielectric final : public BothScalars<RoughDielectric> {
                                    double u2, const Rgb<double>* at) const override;
   double eta_from(bool front, const Rgb<double>*) const override { return eta_of<double>(front); }
   LobeSummary lobe_from(bool, const Rgb<double>* at) const override {
-    const double bound =
-        std::max(specular_reflectance_.bound(at), specular_transmittance_.bound(at));
-    if (is_ggx()) return {ggx_lobe(), alpha(at), bound};
-    return {beckmann_lobe(), alpha(at), bound * microfacet::kBeckmannRationalExcess};
+    double bound = std::max(specular_reflectance_.bound(at), specular_transmittance_.bound(at));
+    const double a = largest_alpha(at);
+    if (is_anisotropic()) {  // as for roughconductor
+      const double ratio = a / std::min(alpha(alpha_, at), alpha(alpha_v_, at));
+      bound *= ratio * ratio;
+    }
+    if (is_ggx()) return {ggx_lobe(), a, bound};
+    return {beckmann_lobe(), a, bound * microfacet::kBeckmannRationalExcess};
   }
   PassedLobe passed_lobe_from(bool front, const Vec3d& n, const Vec3d& wi,
                               const Rgb<double>* at) const override;
 
   Distribution distribution_;
-  BsdfNumber alpha_;
-  Dual eta_;  // the index of refraction inside over that outside, not 1
+  BsdfNumber alpha_, alpha_v_;
+  int tangent_;  // where it stands in `at`; -1 if isotropic
+  Dual eta_;     // the index of refraction inside over that outside, not 1
   BsdfColour specular_reflectance_, specular_transmittance_;
 };
 
@@ -125,15 +144,16 @@ template <class S>
 Rgb<S> RoughDielectric::evaluate(bool front, const Vec3<S>& n, const Vec3<S>& wi, const Vec3<S>& wo,
                                  const Rgb<S>* at) const {
   const S eta = eta_of<S>(front);
-  const Facets<S> facets = this->facets(at);
-  const Facet<S> facet(facets, n, wi, wo, eta);
-  if (!facet.possible) return {};
-  const S f = fresnel_dielectric(facet.cos_h, eta).reflected;
-  const S cos_o = facet.above ? facet.cos_o : -facet.cos_o;
-  const S common = facet.d * facets.masking_over_cos(wi, facet.cos_i) *
-                   facets.masking_over_cos(wo, cos_o) * cos_o;
-  return facet.above ? specular_reflectance_.of(at) * (common * f)
-                     : specular_transmittance_.of(at) * (common * (1.0 - f));
+  return with_facets(n, at, [&](const auto& facets) -> Rgb<S> {
+    const Facet<S> facet(facets, n, wi, wo, eta);
+    if (!facet.possible) return {};
+    const S f = fresnel_dielectric(facet.cos_h, eta).reflected;
+    const S cos_o = facet.above ? facet.cos_o : -facet.cos_o;
+    const S common = facet.d * facets.masking_over_cos(wi, facet.cos_i) *
+                     facets.masking_over_cos(wo, cos_o) * cos_o;
+    return facet.above ? specular_reflectance_.of(at) * (common * f)
+                       : specular_transmittance_.of(at) * (common * (1.0 - f));
+  });
 }
 
 FacetSide RoughDielectric::facet_side(bool front, double cos_h, const Rgb<double>* at) const {
@@ -146,29 +166,32 @@ FacetSide RoughDielectric::facet_side(bool front, double cos_h, const Rgb<double
 double RoughDielectric::pdf_from(bool front, const Vec3d& n, const Vec3d& wi, const Vec3d& wo,
                                  const Rgb<double>* at) const {
   const double eta = eta_of<double>(front);
-  const Facets<double> facets = this->facets(at);
-  const Facet<double> facet(facets, n, wi, wo, eta);
-  if (!facet.possible) return 0;
-  const FacetSide side = facet_side(front, facet.cos_h, at);
-  return facet.d * facets.exact_masking_over_cos(wi, facet.cos_i) *
-         (facet.above ? side.reflecting() : side.passing() * (eta * eta));
+  return with_facets(n, at, [&](const auto& facets) -> double {
+    const Facet<double> facet(facets, n, wi, wo, eta);
+    if (!facet.possible) return 0;
+    const FacetSide side = facet_side(front, facet.cos_h, at);
+    return facet.d * facets.exact_masking_over_cos(wi, facet.cos_i) *
+           (facet.above ? side.reflecting() : side.passing() * (eta * eta));
+  });
 }
 
 std::optional<Vec3d> RoughDielectric::sample_from(bool front, const Vec3d& n, const Vec3d& wi,
                                                   double u1, double u2,
                                                   const Rgb<double>* at) const {
   if (!(dot(n, wi) > 0)) return std::nullopt;
-  const Frame frame(n);
-  const Vec3d v = frame.to_local(wi);
-  const FacetDigit u(u1);
-  const Vec3d h = normalize(facets(at).visible(v, u.rest, u2));
-  const double cos_h = dot(v, h), eta = eta_of<double>(front);
-  const bool above = facet_side(front, cos_h, at).reflects(u.digit);
-  const Vec3d local =
-      above ? reflected(v, h) : refracted(v, h, eta, fresnel_dielectric(cos_h, eta).cos_t);
-  const Vec3d wo = normalize(frame.to_world(local));
-  if ((dot(n, wo) > 0) != above || dot(n, wo) == 0) return std::nullopt;
-  return wo;
+  return with_facets(n, at, [&](const auto& facets) -> std::optional<Vec3d> {
+    const Frame frame = facets.frame(n);
+    const Vec3d v = frame.to_local(wi);
+    const FacetDigit u(u1);
+    const Vec3d h = normalize(facets.visible(v, u.rest, u2));
+    const double cos_h = dot(v, h), eta = eta_of<double>(front);
+    const bool above = facet_side(front, cos_h, at).reflects(u.digit);
+    const Vec3d local =
+        above ? reflected(v, h) : refracted(v, h, eta, fresnel_dielectric(cos_h, eta).cos_t);
+    const Vec3d wo = normalize(frame.to_world(local));
+    if ((dot(n, wo) > 0) != above || dot(n, wo) == 0) return std::nullopt;
+    return wo;
+  });
 }
 
 // The lobe lies about the direction in which a smooth surface would pass the light; half vectors
@@ -183,7 +206,7 @@ Bsdf::PassedLobe RoughDielectric::passed_lobe_from(bool front, const Vec3d& n, c
   const Vec3d axis = size > 0 ? along * (sine / size) - n * cos_t : -n;
   const double turn = 0.5 * std::fabs(1 - cos_i / (eta * cos_t));
   PassedLobe passed{reflected(axis, -n), lobe_from(front, at)};
-  passed.lobe.alpha = std::min(1.0, alpha(at) * turn + kNarrowest);
+  passed.lobe.alpha = std::min(1.0, largest_alpha(at) * turn + kNarrowest);
   return passed;
 }
 
@@ -198,7 +221,9 @@ std::shared_ptr<Bsdf> read_roughdielectric(Properties& properties) {
   values.eta = read_relative_ior(properties, "bk7");
   if (values.eta == 1) properties.fail("int_ior", "int_ior and ext_ior must differ");
   values.distribution = read_distribution(properties);
-  values.alpha = read_alpha(properties);
+  const microfacet::Roughness roughness = microfacet::read_roughness(properties);
+  values.alpha = roughness.u;
+  values.alpha_v = roughness.v;
   values.specular_reflectance = read_reflectance(properties, "specular_reflectance", 1);
   values.specular_transmittance = read_reflectance(properties, "specular_transmittance", 1);
   return make_roughdielectric(values);

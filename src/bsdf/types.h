@@ -1,6 +1,7 @@
 #pragma once
 // Factories of the BSDF types in the registry.
 #include <memory>
+#include <optional>
 
 #include "limn/core/bsdf.h"
 #include "limn/core/make_bsdf.h"
@@ -28,7 +29,8 @@ std::shared_ptr<Bsdf> read_twosided(Properties& properties);
 // A rough dielectric, see roughdielectric.cpp.
 struct RoughDielectricValues {
   RoughConductorValues::Distribution distribution = RoughConductorValues::Distribution::kBeckmann;
-  ConstantOrTexture alpha = 0.1;
+  ConstantOrTexture alpha = 0.1;  // or alpha_u, with alpha_v
+  std::optional<ConstantOrTexture> alpha_v = {};
   double eta = 1.5;  // index of refraction, inside over outside; not 1
   ConstantOrTexture specular_reflectance = 1;
   ConstantOrTexture specular_transmittance = 1;

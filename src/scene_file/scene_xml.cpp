@@ -421,17 +421,26 @@ class SceneBuilder {
     return textures;
   }
 
+  // Gives a mesh without texture coordinates those of its faces where textures read them.
+  void complete_uv(const Shape& shape, RawMesh& raw) {
+    if (raw.uv_source != UvSource::kNone) return;
+    for (const auto& [name, texture] : textures_of(shape)) {
+      if (!texture->needs_uv()) continue;
+      raw.uv_source = UvSource::kFaces;
+      raw.uv_places = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+      raw.uv_ids.assign(raw.faces.size(), {0, 1, 2});
+      warnings_.push_back(format_warning(
+          shape.where, "no texture coordinates in " + raw.where.file + ", needed by the " +
+                           (texture->is_tangent() ? "directions" : "texture") + " of \"" + name +
+                           "\": each face has its barycentric coordinates, as in Mitsuba"));
+      return;
+    }
+  }
+
   // That the mesh has what textures read. Returns the attributes among that.
   static std::vector<std::string> check_textures(const Shape& shape, const RawMesh& raw) {
     std::vector<std::string> wanted;
     for (const auto& [name, texture] : textures_of(shape)) {
-      if (texture->needs_uv() && raw.uv_source == UvSource::kNone) {
-        throw InputError(
-            shape.where,
-            "no texture coordinates in " + raw.where.file +
-                (texture->is_tangent() ? ", which \"" + name + "\" takes its directions from"
-                                       : ", needed by the texture of \"" + name + "\""));
-      }
       const std::string attribute = texture->attribute();
       if (attribute.empty()) continue;
       std::vector<std::string> known;
@@ -527,6 +536,7 @@ class SceneBuilder {
     if (bsdfs.empty() && !shape.is_emitter) scene_.bsdfs_by_id[id + ".bsdf"] = shape.bsdf;
     options.textured = shape.bsdf->texture_count() > 0 || shape.radiance_texture;
     options.tangents = shape.bsdf->needs_tangent();
+    complete_uv(shape, raw);
     const std::vector<std::string> attributes = check_textures(shape, raw);
     options.file_faces = std::any_of(attributes.begin(), attributes.end(),
                                      [](const auto& name) { return name.starts_with("face_"); });

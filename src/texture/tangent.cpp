@@ -3,7 +3,8 @@
 // On a face uv is a function of the barycentric coordinates b, whose Jacobian at a corner gives the
 // direction in which u grows while v stays. At a vertex these unit directions are summed, weighted
 // by the angles of the faces at the corner, over faces that agree there in uv (modulo 1, as texture
-// coordinates repeat) and in orientation. Flat shading keeps those of each face apart.
+// coordinates repeat) and in orientation. Flat shading keeps those of each face apart, as do faces
+// with coordinates of their own: there u grows from the first corner to the second.
 #include "limn/core/tangent.h"
 
 #include <algorithm>
@@ -86,7 +87,7 @@ void assign_ids(Mesh& mesh) {
   for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
     const bool mirrored = steps_of(mesh, FaceId(f)).mirrored;
     for (int c = 0; c < 3; ++c) {
-      if (mesh.normal_source == NormalSource::kFace) {
+      if (mesh.normal_source == NormalSource::kFace || mesh.uv_source == UvSource::kFaces) {
         mesh.u_ids[f][c] = count++;
         continue;
       }

@@ -381,6 +381,23 @@ TEST(TextureEdges, DerivativesAgreeWithDifferences) {
     expect_agreement(scene, name, 256);
 }
 
+// Without texture coordinates textures and tangents are discontinuous at every edge of a mesh.
+TEST(TextureEdges, OfFacesWithoutUvAgreeWithDifferences) {
+  const TempFiles files;
+  SceneParts parts;
+  const std::string ball = write_mesh(files, "ball.obj", icosphere_mesh(0));
+  parts.body = obj_shape("ball", ball, false, 0.8, {-1, 1, 0},
+                         R"(<bsdf type="diffuse">)" + kCheckers + "</texture></bsdf>") +
+               obj_shape("gem", ball, false, 0.8, {1, 1, 0},
+                         R"(<bsdf type="roughconductor"><float name="alpha_u" value="0.15"/>
+                            <float name="alpha_v" value="0.6"/></bsdf>)") +
+               square("lamp", 0.8, 90, {0.5, 3.5, 1}, area_light("glow", "6, 6, 6")) +
+               constant_light("sky", "0.5, 0.5, 0.5");
+  const Scene scene = make_scene(files, parts);
+  for (const char* name : {"ball.rotate.y", "gem.rotate.y", "gem.translate.x", "sensor.fov"})
+    expect_agreement(scene, name, 512);
+}
+
 std::string nearest(const std::string& file, const std::string& wrap) {
   return fmt::format(R"(<texture type="bitmap" name="reflectance">
                      <string name="filename" value="{}"/><boolean name="raw" value="true"/>

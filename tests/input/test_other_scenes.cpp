@@ -532,6 +532,35 @@ TEST(OtherScenes, TextureCoordinatesOfFiles) {
   EXPECT_TRUE(scene.shapes[4].mesh.uv_ids.empty());  // nothing asks for them
 }
 
+// Mitsuba's are barycentric then, from the corner that a file has first.
+TEST(OtherScenes, TextureCoordinatesThatAreMissing) {
+  const TempFiles files;
+  const std::string obj =
+      files.write("a.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 3//1 4//1\n");
+  const std::string file = "<shape type=\"obj\"><string name=\"filename\" value=\"" + obj + "\"/>";
+  std::vector<std::string> warnings;
+  const Scene scene =
+      read(textured("obj", obj, "") + "\n" + file +
+               "<boolean name=\"flip_normals\" value=\"true\"/><bsdf type=\"roughconductor\">"
+               "<float name=\"alpha_u\" value=\"0.1\"/><float name=\"alpha_v\" value=\"0.3\"/>"
+               R"(</bsdf><transform name="to_world"><translate z="2"/></transform></shape>)" +
+               file + R"(<transform name="to_world"><translate z="1"/></transform></shape>)",
+           &warnings);
+  using Uv = std::array<float, 6>;
+  for (size_t face = 0; face < 2; ++face) {
+    EXPECT_EQ(scene.shapes[0].mesh.uv_source, UvSource::kFaces);
+    EXPECT_EQ(uv_of_face(scene.shapes[0].mesh, face), (Uv{0, 0, 1, 0, 0, 1}));
+    EXPECT_EQ(uv_of_face(scene.shapes[1].mesh, face), (Uv{0, 0, 0, 1, 1, 0}));
+  }
+  EXPECT_EQ(scene.shapes[2].mesh.uv_source, UvSource::kNone);
+  const std::string end = "\": each face has its barycentric coordinates, as in Mitsuba";
+  EXPECT_EQ(warnings,
+            (std::vector<std::string>{"string:2:1: warning: no texture coordinates in " + obj +
+                                          ", needed by the texture of \"reflectance" + end,
+                                      "string:3:1: warning: no texture coordinates in " + obj +
+                                          ", needed by the directions of \"alpha_u" + end}));
+}
+
 TEST(OtherScenes, TextureCoordinatesThatCannotBe) {
   const TempFiles files;
   for (const char* number : {"nan", "inf", "1e38", "-1e300"}) {

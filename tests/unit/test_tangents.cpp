@@ -61,8 +61,30 @@ TEST(Tangents, FacesOfOneChartShareThem) {
   EXPECT_EQ(around.u_ids[0][1], around.u_ids[2][0]);
 }
 
-TEST(Tangents, DerivativesMatchDifferences) {
+// Without texture coordinates in a file, along the first side of each face.
+Mesh sheet_without_uv() {
   Mesh mesh = sheet();
+  mesh.uv_source = UvSource::kFaces;
+  mesh.uv_places = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  mesh.uv_ids = std::vector<FaceIndices>(mesh.faces.size(), {0, 1, 2});
+  update_shading_normals(mesh);
+  return mesh;
+}
+
+TEST(Tangents, OfFacesWithoutUvAreTheirSides) {
+  const Mesh mesh = sheet_without_uv();
+  for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
+    const auto p = face_corners<double>(mesh, FaceId(f));
+    for (const double b : {0.0, 0.3}) {
+      EXPECT_NEAR(dot(tangent_at(mesh, FaceId(f), b, 0.2), normalize(p[1] - p[0])), 1, 1e-12);
+    }
+  }
+}
+
+class TangentsOf : public testing::TestWithParam<Mesh (*)()> {};
+
+TEST_P(TangentsOf, DerivativesMatchDifferences) {
+  Mesh mesh = GetParam()();
   const Vec3d velocity[5] = {{1, 0.5, 0}, {0, 1, 2}, {-1, 0, 1}, {0.3, 0.7, 0}, {0, 0, -1}};
   const auto moved = [&](double h) {
     Mesh copy = mesh;
@@ -91,8 +113,8 @@ TEST(Tangents, DerivativesMatchDifferences) {
   }
 }
 
-TEST(Tangents, AdjointIsTheTranspose) {
-  Mesh mesh = sheet();
+TEST_P(TangentsOf, AdjointIsTheTranspose) {
+  Mesh mesh = GetParam()();
   Rng rng(1, 2, 3);
   const auto random_vector = [&] {
     const double x = rng.uniform(), y = rng.uniform(), z = rng.uniform();
@@ -117,6 +139,8 @@ TEST(Tangents, AdjointIsTheTranspose) {
   EXPECT_NEAR(reverse, forward, 1e-12);
   EXPECT_NE(forward, 0);
 }
+
+INSTANTIATE_TEST_SUITE_P(All, TangentsOf, testing::Values(sheet, sheet_without_uv));
 
 }  // namespace
 }  // namespace limn

@@ -52,7 +52,12 @@ enum class UvSource : uint8_t {
   kPlane,   // u = x, v = y
   kSphere,  // place in the unit sphere: azimuth from +x over 2 pi, polar angle from +z over pi
   kDisk,    // place in the unit disk: distance from the center, azimuth over 2 pi
+  kFaces,   // u = x, v = y, the barycentric coordinates of each face, where a file has none
 };
+// Whether u and v are linear over a face.
+inline bool is_linear(UvSource source) {
+  return source == UvSource::kPlane || source == UvSource::kFaces;
+}
 
 class MeshAttribute;  // mesh_attribute.h
 
