@@ -32,6 +32,7 @@ Refraction refraction_of(const Shape& shape, bool front) {
   const Bsdf* side = shape.bsdf->side(front);
   Refraction result;
   if (!side || !side->lobes().smooth || !side->lobes().through) return result;
+  if (shape.bsdf->maps_normals()) return result;
   const Vec3d n{0, 0, 1}, wi = normalize(Vec3d{0x1p-8, 0, 1});  // straight on is another direction
   SmoothRays<double> rays;
   const auto count = static_cast<size_t>(side->smooth_rays(n, wi, rays));

@@ -12,7 +12,7 @@ class BumpMap final : public MappedNormal<BumpMap> {
       : MappedNormal(std::move(nested), options), scale_(scale) {
     gradient_ = colour("bumpmap", make_surface_gradient(heights));
     outward_ = colour("bumpmap", make_outward()).texture;
-    add_nested_textures();
+    add_nested(false);
   }
 
   // With g the gradient of heights over the face, of normal n_g: the shading normal n leans against
@@ -22,21 +22,21 @@ class BumpMap final : public MappedNormal<BumpMap> {
     const auto vector_at = [&](int k) { return Vec3<S>{at[k].r, at[k].g, at[k].b}; };
     const Vec3<S> g = vector_at(gradient_.texture), n_g = vector_at(outward_);
     const Vec3<S> along = g - n_g * (dot(g, n) / dot(n_g, n));
-    return normalize(n - along * (scale_ * turned(side_of(n, n_g))));
+    return normalize(n - along * (scale_ * turned(side_seen(n, n_g))));
   }
 
-  bool map_is_constant() const { return true; }
-  std::vector<ParameterRef> parameters() override { return nested()[0]->parameters(); }
-  std::shared_ptr<Bsdf> clone() const override {
-    const auto copy = std::make_shared<BumpMap>(*this);
-    copy->clone_nested();
-    return copy;
+  std::vector<ParameterRef> parameters() override {
+    std::vector<ParameterRef> list;
+    add_nested_parameters(list);
+    return list;
   }
   std::string describe() const override {
-    return "bumpmap, " + text_of(gradient_) + " (" + inside().describe() + ")";
+    return "bumpmap, " + text_of(gradient_) + " (" + text_of_inside() + ")";
   }
 
  private:
+  bool own_is_constant() const override { return true; }
+
   double scale_;
   BsdfColour gradient_;
   int outward_;  // where it stands in `at`
@@ -48,7 +48,7 @@ std::shared_ptr<Bsdf> read_bumpmap(Properties& properties) {
   const double scale = properties.number("scale", 1);
   const std::shared_ptr<Texture> heights = properties.only_texture();
   if (!heights) properties.fail("bumpmap needs one nested texture");
-  return std::make_shared<BumpMap>(heights, scale, read_mapped_bsdf(properties, 2),
+  return std::make_shared<BumpMap>(heights, scale, read_nested(properties, 1, 2, 0)[0],
                                    read_mapped_normal_options(properties));
 }
 

@@ -2,7 +2,8 @@
 // What normal maps and bump maps share: a BSDF about another normal.
 #include <memory>
 
-#include "src/bsdf/types.h"
+#include "src/bsdf/both_scalars.h"
+#include "src/bsdf/nested.h"
 
 namespace limn {
 
@@ -12,73 +13,39 @@ struct MappedNormalOptions {
   bool shadows = true;  // Mitsuba's shading; any other has them always
 };
 MappedNormalOptions read_mapped_normal_options(Properties& properties);
-// The BSDF inside, opaque and of the front alone or alike on both sides, beside `own` textures.
-std::shared_ptr<Bsdf> read_mapped_bsdf(Properties& properties, int own);
 
 // The nested BSDF about the normal n_b of a map. Where n_b turns from the viewer, n_b.wi < e, it is
-// bent as interpolated normals are (shading.h). What lies above one of the two normals only is
+// bent as interpolated normals are (shading.h). What lies on different sides of the two normals is
 // zero; towards the horizon of the surface's normal n the factor
 //     2 / (1 + sqrt(1 + a tan^2(n, wo))),   a = min(1, tan^2(n, n_b) / 8)
 // makes the value vanish (Estevez et al. 2019, "A microfacet-based shadowing function to solve the
 // bump terminator problem"; Mitsuba has it, too). So the value is continuous wherever the map is.
-// Map: derives from this and has normal(n, at), n_b from n and the values of its own textures, and
-// map_is_constant(), true if its own numbers are as in is_constant.
+// Map: derives from this and has normal(n, at), n_b from n and the values of its own textures.
 template <class Map>
-class MappedNormal : public Bsdf {
+class MappedNormal : public BothScalars<Map, NestingBsdf> {
  public:
-  Rgb<double> eval(const Vec3<double>& n, const Vec3<double>& wi, const Vec3<double>& wo,
-                   const Rgb<double>* at) const final {
-    return evaluate(n, wi, wo, at);
+  template <class S>
+  Rgb<S> evaluate(bool front, const Vec3<S>& n, const Vec3<S>& wi, const Vec3<S>& wo,
+                  const Rgb<S>* at) const {
+    if (!is_seen(front, value(n), value(wi), value(wo))) return {};
+    const Vec3<S> n_b = bent(n, wi, at);
+    if (!is_on_one_side(value(n), value(n_b), value(wo))) return {};
+    return this->side_of(0, front)->eval(n_b, wi, wo, this->at_of(0, at)) * shadow(n, n_b, wo);
   }
-  Rgb<Dual> eval(const Vec3<Dual>& n, const Vec3<Dual>& wi, const Vec3<Dual>& wo,
-                 const Rgb<Dual>* at) const final {
-    return evaluate(n, wi, wo, at);
+  // What would leave on different sides of n and n_b is zero.
+  template <class S>
+  int rays(bool front, const Vec3<S>& n, const Vec3<S>& wi, SmoothRays<S>& rays,
+           const Rgb<S>* at) const {
+    const Vec3<S> n_b = bent(n, wi, at);
+    const int count = this->side_of(0, front)->smooth_rays(n_b, wi, rays, this->at_of(0, at));
+    for (int k = 0; k < count; ++k) {
+      SmoothRay<S>& ray = rays[k];
+      const bool seen = is_on_one_side(value(n), value(n_b), value(ray.wo));
+      ray.weight = seen ? ray.weight * shadow(n, n_b, ray.wo) : Rgb<S>{};
+    }
+    return count;
   }
-  double pdf_solid_angle(const Vec3d& n, const Vec3d& wi, const Vec3d& wo,
-                         const Rgb<double>* at) const final {
-    if (!is_seen(n, wi, wo)) return 0;
-    return nested_->pdf_solid_angle(bent(n, wi, at), wi, wo, inner(at));
-  }
-  BsdfValue eval_with_pdf(const Vec3d& n, const Vec3d& wi, const Vec3d& wo,
-                          const Rgb<double>* at) const final {
-    if (!is_seen(n, wi, wo)) return {};
-    const Vec3d n_b = bent(n, wi, at);
-    BsdfValue f = nested_->eval_with_pdf(n_b, wi, wo, inner(at));
-    f.value = f.value * shadow(n, n_b, wo);
-    return f;
-  }
-  std::optional<Vec3d> sample(const Vec3d& n, const Vec3d& wi, double u1, double u2,
-                              const Rgb<double>* at) const final {
-    if (!(dot(n, wi) > 0)) return std::nullopt;
-    const auto wo = nested_->sample(bent(n, wi, at), wi, u1, u2, inner(at));
-    return wo && dot(n, *wo) > 0 ? wo : std::nullopt;
-  }
-
-  int smooth_rays(const Vec3<double>& n, const Vec3<double>& wi, SmoothRays<double>& rays,
-                  const Rgb<double>* at) const final {
-    return mapped_rays(n, wi, rays, at);
-  }
-  int smooth_rays(const Vec3<Dual>& n, const Vec3<Dual>& wi, SmoothRays<Dual>& rays,
-                  const Rgb<Dual>* at) const final {
-    return mapped_rays(n, wi, rays, at);
-  }
-
-  bool is_constant() const final {
-    return static_cast<const Map&>(*this).map_is_constant() && nested_->is_constant();
-  }
-  Vec3d scattering_normal(const Vec3d& n, const Vec3d& wi, const Rgb<double>* at) const final {
-    return nested_->scattering_normal(bent(n, wi, at), wi, inner(at));
-  }
-  LobeSummary lobe(const Rgb<double>* at) const final { return nested_->lobe(inner(at)); }
-  const Bsdf* side(bool front) const final { return front || two_sided_ ? this : nullptr; }
-  // Its own textures, then those of the nested BSDF.
-  Texture& texture(int k) const final {
-    return k < own_ ? Bsdf::texture(k) : nested_->texture(k - own_);
-  }
-  std::string texture_name(int k) const final {
-    return k < own_ ? Bsdf::texture_name(k) : nested_->texture_name(k - own_);
-  }
-  std::span<std::shared_ptr<Bsdf>> nested() final { return {&nested_, 1}; }
+  bool maps_normals() final { return true; }
   void set_mitsuba_shading(bool mitsuba) final {
     mitsuba_ = mitsuba;
     Bsdf::set_mitsuba_shading(mitsuba);
@@ -86,35 +53,66 @@ class MappedNormal : public Bsdf {
 
  protected:
   MappedNormal(std::shared_ptr<Bsdf> nested, const MappedNormalOptions& options)
-      : nested_(std::move(nested)), options_(options) {
-    lobes_ = nested_->lobes();
-    two_sided_ = nested_->side(false) != nullptr;
-  }
-  // For clone(), of a copy.
-  void clone_nested() { nested_ = nested_->clone(); }
-  // For constructors, after the map's own textures.
-  void add_nested_textures() {
-    own_ = texture_count_;
-    texture_count_ += nested_->texture_count();
-  }
-  const Bsdf& inside() const { return *nested_; }
+      : BothScalars<Map, NestingBsdf>(std::vector<std::shared_ptr<Bsdf>>{std::move(nested)}),
+        options_(options) {}
   // -1 where the surface is seen from the back, else 1. outward: the value of make_outward().
   template <class S>
-  static double side_of(const Vec3<S>& n, const Vec3<S>& outward) {
+  static double side_seen(const Vec3<S>& n, const Vec3<S>& outward) {
     return dot(value(n), value(outward)) < 0 ? -1 : 1;
   }
   // -1 where the map's slopes count the other way: from the back, where the map bends the normal
   // first and the BSDF inside turns it. Inside twosided, the surface is turned first (Mitsuba).
-  double turned(double side) const { return two_sided_ ? side : 1; }
+  double turned(double side) const { return this->side(false) ? side : 1; }
+  std::string text_of_inside() const {
+    return const_cast<MappedNormal*>(this)->nested()[0]->describe();  // NOLINT
+  }
 
  private:
-  static bool is_seen(const Vec3d& n, const Vec3d& wi, const Vec3d& wo) {
-    return dot(n, wi) > 0 && dot(n, wo) > 0;
+  bool is_seen(bool front, const Vec3d& n, const Vec3d& wi, const Vec3d& wo) const {
+    return dot(n, wi) > 0 && (dot(n, wo) > 0 || this->side_of(0, front)->lobes().below);
   }
-  template <class S>
-  const Rgb<S>* inner(const Rgb<S>* at) const {
-    return at ? at + own_ : nullptr;
+  static bool is_on_one_side(const Vec3d& n, const Vec3d& n_b, const Vec3d& wo) {
+    return dot(n, wo) * dot(n_b, wo) > 0;
   }
+
+  double pdf_from(bool front, const Vec3d& n, const Vec3d& wi, const Vec3d& wo,
+                  const Rgb<double>* at) const final {
+    if (!is_seen(front, n, wi, wo)) return 0;
+    const Vec3d n_b = bent(n, wi, at);
+    if (!is_on_one_side(n, n_b, wo)) return 0;
+    return this->side_of(0, front)->pdf_solid_angle(n_b, wi, wo, this->at_of(0, at));
+  }
+  BsdfValue eval_with_pdf_from(bool front, const Vec3d& n, const Vec3d& wi, const Vec3d& wo,
+                               const Rgb<double>* at) const final {
+    if (!is_seen(front, n, wi, wo)) return {};
+    const Vec3d n_b = bent(n, wi, at);
+    if (!is_on_one_side(n, n_b, wo)) return {};
+    BsdfValue f = this->side_of(0, front)->eval_with_pdf(n_b, wi, wo, this->at_of(0, at));
+    f.value = f.value * shadow(n, n_b, wo);
+    return f;
+  }
+  std::optional<Vec3d> sample_from(bool front, const Vec3d& n, const Vec3d& wi, double u1,
+                                   double u2, const Rgb<double>* at) const final {
+    if (!(dot(n, wi) > 0)) return std::nullopt;
+    const Vec3d n_b = bent(n, wi, at);
+    const auto wo = this->side_of(0, front)->sample(n_b, wi, u1, u2, this->at_of(0, at));
+    return wo && is_on_one_side(n, n_b, *wo) ? wo : std::nullopt;
+  }
+  double eta_from(bool front, const Rgb<double>* at) const final {
+    return this->side_of(0, front)->eta(this->at_of(0, at));
+  }
+  LobeSummary lobe_from(bool front, const Rgb<double>* at) const final {
+    return this->side_of(0, front)->lobe(this->at_of(0, at));
+  }
+  Bsdf::PassedLobe passed_lobe_from(bool front, const Vec3d& n, const Vec3d& wi,
+                                    const Rgb<double>* at) const final {
+    return this->side_of(0, front)->passed_lobe(bent(n, wi, at), wi, this->at_of(0, at));
+  }
+  Vec3d scattering_normal_from(bool front, const Vec3d& n, const Vec3d& wi,
+                               const Rgb<double>* at) const final {
+    return this->side_of(0, front)->scattering_normal(bent(n, wi, at), wi, this->at_of(0, at));
+  }
+
   template <class S>
   Vec3<S> bent(const Vec3<S>& n, const Vec3<S>& wi, const Rgb<S>* at) const {
     if (!at) return n;
@@ -130,37 +128,16 @@ class MappedNormal : public Bsdf {
   S shadow(const Vec3<S>& n, const Vec3<S>& n_b, const Vec3<S>& wo) const {
     using std::sqrt;
     if (mitsuba_ && !options_.shadows) return 1.0;
-    const S cos_d = dot(n, n_b), cos_o = dot(n, wo);
+    const S cos_d = dot(n, n_b), cos = dot(n, wo);
+    const S cos_o = value(cos) < 0 ? S(-cos) : cos;
     const S d2 = cos_d * cos_d, o2 = cos_o * cos_o;
     // a tan^2(n, wo) = a (1 - o2) / o2, written as a fraction that stays finite.
     const S a = 9.0 * value(d2) < 1 ? S(1.0) : (1.0 - d2) / (8.0 * d2);
     return 2.0 * cos_o / (cos_o + sqrt(o2 + a * (1.0 - o2)));
   }
-  template <class S>
-  Rgb<S> evaluate(const Vec3<S>& n, const Vec3<S>& wi, const Vec3<S>& wo, const Rgb<S>* at) const {
-    if (!is_seen(value(n), value(wi), value(wo))) return {};
-    const Vec3<S> n_b = bent(n, wi, at);
-    return nested_->eval(n_b, wi, wo, inner(at)) * shadow(n, n_b, wo);
-  }
 
-  // What would leave below n is zero.
-  template <class S>
-  int mapped_rays(const Vec3<S>& n, const Vec3<S>& wi, SmoothRays<S>& rays,
-                  const Rgb<S>* at) const {
-    const Vec3<S> n_b = bent(n, wi, at);
-    const int count = nested_->smooth_rays(n_b, wi, rays, inner(at));
-    for (int k = 0; k < count; ++k) {
-      SmoothRay<S>& ray = rays[k];
-      const bool seen = is_seen(value(n), value(wi), value(ray.wo));
-      ray.weight = seen ? ray.weight * shadow(n, n_b, ray.wo) : Rgb<S>{};
-    }
-    return count;
-  }
-
-  std::shared_ptr<Bsdf> nested_;
   MappedNormalOptions options_;
-  bool mitsuba_ = false, two_sided_ = false;  // two_sided_: the BSDF inside is
-  int own_ = 0;                               // number of its own textures
+  bool mitsuba_ = false;
 };
 
 }  // namespace limn

@@ -1,7 +1,6 @@
 // Normal maps: normals from a texture, in the frame of tangent, bitangent and shading normal.
 #include "limn/core/tangent.h"
 #include "src/bsdf/mapped_normal.h"
-#include "src/bsdf/nested.h"
 #include "src/bsdf/tangent_frame.h"
 
 namespace limn {
@@ -16,7 +15,7 @@ class NormalMap final : public MappedNormal<NormalMap> {
     map_ = colour("normalmap", map);
     tangent_ = add_tangent("normalmap");
     outward_ = colour("normalmap", make_outward()).texture;
-    add_nested_textures();
+    add_nested(false);
   }
 
   // The colour t stands for 2 t - 1. Seen from the back, tangent and bitangent stay, or both turn.
@@ -26,30 +25,27 @@ class NormalMap final : public MappedNormal<NormalMap> {
     const Rgb<S> t = map_.of(at);
     const Vec3<S> m = Vec3<S>{t.r, t.g, t.b} * 2.0 - Vec3<S>{1.0, 1.0, 1.0};
     const Vec3<S> s = along_surface(n, vector_at(tangent_));
-    const double side = side_of(n, vector_at(outward_));
+    const double side = side_seen(n, vector_at(outward_));
     const Vec3<S> sum =
         s * (m.x * turned(side)) + cross(n, s) * (m.y * side * turned(side)) + n * m.z;
     return value(length_squared(sum)) > 0 ? normalize(sum) : n;
   }
 
-  bool map_is_constant() const { return limn::is_constant(map_.constant); }
   std::vector<ParameterRef> parameters() override {
-    std::vector<ParameterRef> list = nested()[0]->parameters(), own;
+    std::vector<ParameterRef> list, own;
+    add_nested_parameters(list);
     add_parameter("normalmap", map_, 0, 1, own);
     for (ParameterRef& p : own) p.mixes_channels = true;
     list.insert(list.end(), own.begin(), own.end());
     return list;
   }
-  std::shared_ptr<Bsdf> clone() const override {
-    const auto copy = std::make_shared<NormalMap>(*this);
-    copy->clone_nested();
-    return copy;
-  }
   std::string describe() const override {
-    return "normalmap, " + text_of(map_) + " (" + inside().describe() + ")";
+    return "normalmap, " + text_of(map_) + " (" + text_of_inside() + ")";
   }
 
  private:
+  bool own_is_constant() const override { return limn::is_constant(map_.constant); }
+
   BsdfColour map_;
   int tangent_, outward_;  // where they stand in `at`
 };
@@ -63,24 +59,13 @@ MappedNormalOptions read_mapped_normal_options(Properties& properties) {
   return options;
 }
 
-std::shared_ptr<Bsdf> read_mapped_bsdf(Properties& properties, int own) {
-  const std::shared_ptr<Bsdf> nested = read_nested(properties, 1, own, 0)[0];
-  if (nested->lobes().through) {
-    properties.fail("takes no bsdf that passes light (remove the map): " + nested->describe());
-  }
-  if (nested->side(false) && nested->side(false) != nested->side(true)) {
-    properties.fail("takes no bsdf whose sides differ: put a map into each of them");
-  }
-  return nested;
-}
-
 std::shared_ptr<Bsdf> read_normalmap(Properties& properties) {
   const auto texture = properties.texture("normalmap");
   if (!texture && !properties.has("normalmap"))
     properties.fail("a normalmap needs a texture \"normalmap\"");
   const ConstantOrTexture map =
       texture ? ConstantOrTexture(texture) : properties.rgb("normalmap", {});
-  return std::make_shared<NormalMap>(map, read_mapped_bsdf(properties, 3),
+  return std::make_shared<NormalMap>(map, read_nested(properties, 1, 3, 0)[0],
                                      read_mapped_normal_options(properties));
 }
 

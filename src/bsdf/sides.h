@@ -24,7 +24,7 @@ class SidedBsdf : public Bsdf {
   }
   BsdfValue eval_with_pdf(const Vec3d& n, const Vec3d& wi, const Vec3d& wo,
                           const Rgb<double>* at) const final {
-    return {eval_from(true, n, wi, wo, at), pdf_from(true, n, wi, wo, at)};
+    return eval_with_pdf_from(true, n, wi, wo, at);
   }
   std::optional<Vec3d> sample(const Vec3d& n, const Vec3d& wi, double u1, double u2,
                               const Rgb<double>* at) const final {
@@ -42,6 +42,9 @@ class SidedBsdf : public Bsdf {
   LobeSummary lobe(const Rgb<double>* at) const final { return lobe_from(true, at); }
   PassedLobe passed_lobe(const Vec3d& n, const Vec3d& wi, const Rgb<double>* at) const final {
     return passed_lobe_from(true, n, wi, at);
+  }
+  Vec3d scattering_normal(const Vec3d& n, const Vec3d& wi, const Rgb<double>* at) const final {
+    return scattering_normal_from(true, n, wi, at);
   }
   const Bsdf* side(bool front) const final {
     if (front) return this;
@@ -73,6 +76,10 @@ class SidedBsdf : public Bsdf {
                           const Vec3d& /*wo*/, const Rgb<double>* /*at*/) const {
     return 0;
   }
+  virtual BsdfValue eval_with_pdf_from(bool front, const Vec3d& n, const Vec3d& wi, const Vec3d& wo,
+                                       const Rgb<double>* at) const {
+    return {eval_from(front, n, wi, wo, at), pdf_from(front, n, wi, wo, at)};
+  }
   virtual std::optional<Vec3d> sample_from(bool /*front*/, const Vec3d& /*n*/, const Vec3d& /*wi*/,
                                            double /*u1*/, double /*u2*/,
                                            const Rgb<double>* /*at*/) const {
@@ -93,6 +100,10 @@ class SidedBsdf : public Bsdf {
   virtual PassedLobe passed_lobe_from(bool /*front*/, const Vec3d& n, const Vec3d& /*wi*/,
                                       const Rgb<double>* /*at*/) const {
     return {-n, {}};
+  }
+  virtual Vec3d scattering_normal_from(bool /*front*/, const Vec3d& n, const Vec3d& /*wi*/,
+                                       const Rgb<double>* /*at*/) const {
+    return n;
   }
 
  private:
@@ -118,7 +129,7 @@ class SidedBsdf : public Bsdf {
     }
     BsdfValue eval_with_pdf(const Vec3d& n, const Vec3d& wi, const Vec3d& wo,
                             const Rgb<double>* at) const override {
-      return {of_.eval_from(false, n, wi, wo, at), of_.pdf_from(false, n, wi, wo, at)};
+      return of_.eval_with_pdf_from(false, n, wi, wo, at);
     }
     std::optional<Vec3d> sample(const Vec3d& n, const Vec3d& wi, double u1, double u2,
                                 const Rgb<double>* at) const override {
@@ -136,6 +147,9 @@ class SidedBsdf : public Bsdf {
     LobeSummary lobe(const Rgb<double>* at) const override { return of_.lobe_from(false, at); }
     PassedLobe passed_lobe(const Vec3d& n, const Vec3d& wi, const Rgb<double>* at) const override {
       return of_.passed_lobe_from(false, n, wi, at);
+    }
+    Vec3d scattering_normal(const Vec3d& n, const Vec3d& wi, const Rgb<double>* at) const override {
+      return of_.scattering_normal_from(false, n, wi, at);
     }
     const Bsdf* side(bool front) const override { return of_.side(front); }
     bool is_constant() const override { return of_.is_constant(); }

@@ -10,8 +10,11 @@ namespace limn::test {
 
 class HeldTextures final : public Bsdf {
  public:
-  HeldTextures(std::shared_ptr<Bsdf> bsdf, std::vector<Rgb<double>> values)
-      : bsdf_(std::move(bsdf)), values_(std::move(values)) {}
+  HeldTextures(std::shared_ptr<Bsdf> bsdf, std::vector<Rgb<double>> values, bool front = true)
+      : bsdf_(std::move(bsdf)), of_(bsdf_->side(front)), values_(std::move(values)) {
+    lobes_ = of_->lobes();
+    if (front && bsdf_->side(false)) back_ = std::make_shared<HeldTextures>(bsdf_, values_, false);
+  }
 
   // The values of all textures; derivatives may be added.
   std::vector<Rgb<Dual>> duals() const {
@@ -24,28 +27,30 @@ class HeldTextures final : public Bsdf {
 
   Rgb<double> eval(const Vec3<double>& n, const Vec3<double>& wi, const Vec3<double>& wo,
                    const Rgb<double>*) const override {
-    return bsdf_->eval(n, wi, wo, values_.data());
+    return of_->eval(n, wi, wo, values_.data());
   }
   Rgb<Dual> eval(const Vec3<Dual>& n, const Vec3<Dual>& wi, const Vec3<Dual>& wo,
                  const Rgb<Dual>*) const override {
-    return bsdf_->eval(n, wi, wo, duals().data());
+    return of_->eval(n, wi, wo, duals().data());
   }
   double pdf_solid_angle(const Vec3d& n, const Vec3d& wi, const Vec3d& wo,
                          const Rgb<double>*) const override {
-    return bsdf_->pdf_solid_angle(n, wi, wo, values_.data());
+    return of_->pdf_solid_angle(n, wi, wo, values_.data());
   }
   BsdfValue eval_with_pdf(const Vec3d& n, const Vec3d& wi, const Vec3d& wo,
                           const Rgb<double>*) const override {
-    return bsdf_->eval_with_pdf(n, wi, wo, values_.data());
+    return of_->eval_with_pdf(n, wi, wo, values_.data());
   }
   std::optional<Vec3d> sample(const Vec3d& n, const Vec3d& wi, double u1, double u2,
                               const Rgb<double>*) const override {
-    return bsdf_->sample(n, wi, u1, u2, values_.data());
+    return of_->sample(n, wi, u1, u2, values_.data());
   }
   Vec3d scattering_normal(const Vec3d& n, const Vec3d& wi, const Rgb<double>*) const override {
-    return bsdf_->scattering_normal(n, wi, values_.data());
+    return of_->scattering_normal(n, wi, values_.data());
   }
-  LobeSummary lobe(const Rgb<double>*) const override { return bsdf_->lobe(values_.data()); }
+  LobeSummary lobe(const Rgb<double>*) const override { return of_->lobe(values_.data()); }
+  double eta(const Rgb<double>*) const override { return of_->eta(values_.data()); }
+  const Bsdf* side(bool front) const override { return front ? this : back_.get(); }
   // Not those of textures.
   std::vector<ParameterRef> parameters() override {
     std::vector<ParameterRef> list = bsdf_->parameters();
@@ -60,6 +65,8 @@ class HeldTextures final : public Bsdf {
 
  private:
   std::shared_ptr<Bsdf> bsdf_;
+  const Bsdf* of_;  // its side
+  std::shared_ptr<HeldTextures> back_;
   std::vector<Rgb<double>> values_;
 };
 

@@ -10,6 +10,7 @@
 // What varies over the surface comes as an argument `at`: the values of the BSDF's textures at the
 // point, texture_count() of them, texture(k) at index k. Constants are no part of it. A null `at`
 // lets the textures' means stand for them, where a density is wanted and the point is unknown.
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <span>
@@ -100,6 +101,11 @@ class Bsdf {
   virtual Vec3d scattering_normal(const Vec3d& n, const Vec3d& /*wi*/,
                                   const Rgb<double>* /*at*/) const {
     return n;
+  }
+  // Whether that is another than n, here or of a nested BSDF.
+  virtual bool maps_normals() {
+    const auto inside = nested();
+    return std::any_of(inside.begin(), inside.end(), [](auto& b) { return b->maps_normals(); });
   }
   // The summary of the rough lobes that edge samplers use as importance. By default the hemisphere
   // with albedo 1. With a null `at` its albedo bounds that at all points.
