@@ -9,21 +9,14 @@ namespace {
 
 double magnitude(const Rgb<double>& a) { return std::fabs(a.r) + std::fabs(a.g) + std::fabs(a.b); }
 
-// The derivative of Filter::eval.
-double slope(const Filter& filter, double x) {
-  if (filter.kind == Filter::Kind::kBox || std::fabs(x) >= filter.radius) return 0;
-  if (filter.kind == Filter::Kind::kTent) return (x < 0 ? 1 : -1) / filter.radius;
-  const double variance = filter.stddev * filter.stddev;
-  return -x / variance * std::exp(-x * x / (2 * variance));
-}
-
 // Of the filters of the crop's columns, or rows, that reach a place along their axis.
 struct Reach {
   int first = 0;
-  std::vector<double> weight, slope;
+  std::vector<double> weight, slope, pdf;  // pdf: of the pixel's samples
 };
 
-Reach reach(const Film& film, double at, int begin, int count, bool columns) {
+Reach reach(const Film& film, const FilterTable& table, double at, int begin, int count,
+            bool columns) {
   const double radius = film.filter.radius;
   Reach result;
   result.first = std::max(begin, static_cast<int>(std::floor(at - 0.5 - radius)));
@@ -35,7 +28,10 @@ Reach reach(const Film& film, double at, int begin, int count, bool columns) {
     const double scale =
         reaches ? 1 / (film.filter.integral(range.upper) - film.filter.integral(range.lower)) : 0;
     result.weight.push_back(film.filter.eval(offset) * scale);
-    result.slope.push_back(slope(film.filter, offset) * scale);
+    result.slope.push_back(film.filter.slope(offset) * scale);
+    result.pdf.push_back(reaches && film.filter.is_signed()
+                             ? table.pdf(range.lower, range.upper, offset)
+                             : result.weight.back());
   }
   return result;
 }
@@ -44,7 +40,7 @@ Reach reach(const Film& film, double at, int begin, int count, bool columns) {
 
 FilterAdjoint::FilterAdjoint(const Film& film, const FilmAdjoint& adjoint,
                              const PixelChoice& choice, const FilmField& field)
-    : film_(film), adjoint_(adjoint), choice_(choice), field_(field) {
+    : film_(film), table_(film.filter), adjoint_(adjoint), choice_(choice), field_(field) {
   add_lines();
 }
 
@@ -64,8 +60,8 @@ void FilterAdjoint::add_path(const PixelSample& pixel, double paths, const FilmP
     a = weigh(pixel.x, pixel.y);
     all = density(pixel.x, pixel.y);
   } else {
-    const Reach columns = reach(film_, at.x, film_.crop_x, film_.crop_width, true);
-    const Reach rows = reach(film_, at.y, film_.crop_y, film_.crop_height, false);
+    const Reach columns = reach(film_, table_, at.x, film_.crop_x, film_.crop_width, true);
+    const Reach rows = reach(film_, table_, at.y, film_.crop_y, film_.crop_height, false);
     for (size_t j = 0; j < rows.weight.size(); ++j) {
       for (size_t i = 0; i < columns.weight.size(); ++i) {
         const int x = columns.first + static_cast<int>(i), y = rows.first + static_cast<int>(j);
@@ -73,7 +69,7 @@ void FilterAdjoint::add_path(const PixelSample& pixel, double paths, const FilmP
         a += own * weight;
         along_x += own * columns.slope[i] * rows.weight[j];
         along_y += own * columns.weight[i] * rows.slope[j];
-        all += density(x, y) * weight;
+        all += density(x, y) * columns.pdf[i] * rows.pdf[j];
       }
     }
   }

@@ -48,6 +48,7 @@ class FilterAdjoint {
   FilmPosition place(const Line& line, double along) const;
 
   const Film& film_;
+  FilterTable table_;
   const FilmAdjoint& adjoint_;
   const PixelChoice& choice_;
   const FilmField& field_;

@@ -203,7 +203,8 @@ ReverseEstimator::Path ReverseEstimator::path(const Batch& batch, size_t index) 
 
 bool ReverseEstimator::trace(const Path& path, Tape& tape, GradientTile& to) const {
   const auto& [at, expected, paths, key] = path;
-  const Rgb<double> adjoint = film_.of_pixel(at.x, at.y) * (1 / expected);
+  const double weight = pixel_filter_weight(scene().film, filter_, at.x, at.y, key);
+  const Rgb<double> adjoint = film_.of_pixel(at.x, at.y) * (weight / expected);
   const bool filters = field_ && adds(pixel_slot_);
   if (is_black(adjoint) && !(filters && filtered_->needs_all())) return true;
   TermCost& cost = to.costs[pixel_slot_];

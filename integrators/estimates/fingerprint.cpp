@@ -103,6 +103,8 @@ void add_camera(const Scene& scene, Hash& hash) {
     hash.add(static_cast<uint64_t>(v));
   hash.add(f.filter.radius);
   hash.add(f.filter.stddev);
+  hash.add(f.filter.b);
+  hash.add(f.filter.c);
 }
 
 void add_course(const Course& course, Hash& hash) {

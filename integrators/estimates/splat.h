@@ -8,12 +8,10 @@
 
 namespace limn {
 
-// The slope of the logarithm of a tent or gaussian, within its radius; 0 at a tent's tip.
+// The slope of the filter's logarithm within its radius; 0 where it is 0.
 inline double log_slope(const Filter& filter, double x) {
-  if (filter.kind == Filter::Kind::kTent)
-    return x == 0 ? 0 : std::copysign(1, -x) / (filter.radius * filter.eval(x));
-  const double variance = filter.stddev * filter.stddev;
-  return -x / variance * std::exp(-x * x / (2 * variance)) / filter.eval(x);
+  const double at = filter.eval(x);
+  return at == 0 ? 0 : filter.slope(x) / at;
 }
 
 // Calls visit(x, y, weight) for every pixel of the crop window whose value holds radiance at the

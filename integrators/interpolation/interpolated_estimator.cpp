@@ -387,7 +387,8 @@ void InterpolatedEstimator::add_pixels(std::span<const KeyedSample> samples,
     try {
       const Rgb<double> radiance = sample(one, rays, loops);
       if (!is_finite(radiance)) throw UntraceableRay();
-      sink.add_radiance(one.at, radiance, 1);
+      sink.add_radiance(one.at, radiance,
+                        pixel_filter_weight(scene_.film, filter_, one.at.x, one.at.y, one.key));
     } catch (const UntraceableRay&) {
       sink.reject(one.at, slot_name(0));
     }

@@ -20,8 +20,8 @@ void check_moving_particles(const Scene& scene) {
   const Film& film = scene.film;
   if (film.filter.kind != Filter::Kind::kBox && film.sample_border) return;
   throw InputError(film.where,
-                   "derivatives by particles need a filter that ends nowhere at once: tent or "
-                   "gaussian, with sample_border");
+                   "derivatives by particles need a filter that ends nowhere at once: any but "
+                   "box, with sample_border");
 }
 
 std::shared_ptr<const Scene> seeded(const Scene& scene, std::span<const BlurredNumber> derived,
@@ -78,13 +78,14 @@ void BlurredEstimator::add(const KeyedSample& sample, const CameraView<S>& view,
   }
   sink.cost(0).add(rays);
   ++sink.cost(0).samples;
+  const double weight = pixel_filter_weight(scene_->film, filter_, at.x, at.y, place);
   if (!traced || !is_finite(value(radiance))) return sink.reject(at, slot_name(0));
   if constexpr (std::is_same_v<S, Dual>) {
     const Rgb<Lanes> derivative{radiance.r.d, radiance.g.d, radiance.b.d};
     if (!is_finite(derivative)) return sink.reject(at, slot_name(0));
-    sink.add(0, at, derivative, 1);
+    sink.add(0, at, derivative, weight);
   }
-  sink.add_radiance(at, value(radiance), 1);
+  sink.add_radiance(at, value(radiance), weight);
 }
 
 void BlurredEstimator::add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const {

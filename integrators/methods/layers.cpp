@@ -99,12 +99,13 @@ class LayerEstimator final : public SampleEstimator {
     const auto surface = surface_on_ray<double>(scene_, hit.face, start.origin, start.direction);
     const Seen seen{surface,         hit.t,      start.origin + start.direction * hit.t,
                     start.direction, sample.key, scene_.shading};
+    const double weight = pixel_filter_weight(scene_.film, filter_, sample.at.x, sample.at.y, film);
     for (size_t slot = 0; slot < types_.size(); ++slot) {
       const Rgb<double> value = types_[slot]->value(seen);
       if (is_finite(value)) {
         Rgb<Lanes> lanes;
         for (int c = 0; c < 3; ++c) lanes[c][0] = value[c];
-        sink.add(slot, sample.at, lanes, 1);
+        sink.add(slot, sample.at, lanes, weight);
       } else {
         sink.reject(sample.at, slot_name(slot));
       }

@@ -165,7 +165,7 @@ void LightTracedEstimator::add_pixels(std::span<const KeyedSample> samples,
       sink.reject(at, slot_name(0));
       continue;
     }
-    sink.add_radiance(at, radiance, 1);
+    sink.add_radiance(at, radiance, pixel_filter_weight(scene_.film, filter_, at.x, at.y, place));
   }
 }
 

@@ -52,13 +52,14 @@ void RadianceEstimator::add_pixels(std::span<const KeyedSample> samples, SampleS
       PathLog visitor(*sink.log());
       for (const KeyedSample& sample : samples) {
         const std::span<const KeyedSample> one(&sample, 1);
-        trace(one, {scene_, camera_, filter_, one, mirrored}, &visitor, sink,
-              [&](const auto& walks) { add(walks, one, weight, sink); });
+        const FilmRays rays(scene_, camera_, filter_, one, mirrored);
+        trace(one, rays, &visitor, sink,
+              [&](const auto& walks) { add(walks, one, rays, weight, sink); });
       }
     } else {
-      trace(samples, {scene_, camera_, filter_, samples, mirrored},
-            static_cast<NoVisitor*>(nullptr), sink,
-            [&](const auto& walks) { add(walks, samples, weight, sink); });
+      const FilmRays rays(scene_, camera_, filter_, samples, mirrored);
+      trace(samples, rays, static_cast<NoVisitor*>(nullptr), sink,
+            [&](const auto& walks) { add(walks, samples, rays, weight, sink); });
     }
   }
 }
@@ -88,7 +89,7 @@ void RadianceEstimator::trace(std::span<const KeyedSample> samples, const FilmRa
 
 template <class Walk>
 void RadianceEstimator::add(const std::vector<Walk>& walks, std::span<const KeyedSample> samples,
-                            double weight, SampleSink& sink) const {
+                            const FilmRays& rays, double weight, SampleSink& sink) const {
   // Samples of a pixel follow each other: its sum is in memory but before and after them, as each
   // would wait for the one before.
   double* pixel = nullptr;
@@ -107,7 +108,7 @@ void RadianceEstimator::add(const std::vector<Walk>& walks, std::span<const Keye
       pixel = at;
       sum = {at[0], at[1], at[2]};
     }
-    sum = sum + radiance * weight;
+    sum = sum + radiance * (weight * rays.weight(scene_.film, filter_, samples[i].at, i));
   }
   leave_pixel();
 }

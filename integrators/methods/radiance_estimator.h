@@ -37,8 +37,8 @@ class RadianceEstimator final : public SampleEstimator {
   void trace(std::span<const KeyedSample> samples, const FilmRays& rays, Visitor* visitor,
              SampleSink& sink, const Add& add) const;
   template <class Walk>
-  void add(const std::vector<Walk>& walks, std::span<const KeyedSample> samples, double weight,
-           SampleSink& sink) const;
+  void add(const std::vector<Walk>& walks, std::span<const KeyedSample> samples,
+           const FilmRays& rays, double weight, SampleSink& sink) const;
   // Weights of a place's pixels, once for each channel: as `SharedPlace::weights`, but the left
   // ones of a row first, as pixels lie in memory.
   using Footprint = std::array<double, size_t{3} * SharedPlace::kMostSide * SharedPlace::kMostSide>;

@@ -114,7 +114,10 @@ Rgb<double> VisibilityEstimator::sample(const PixelSample& at, SampleLog* log, R
     Rgb<double> sum;
     for (int k = 0; k < points; ++k) {
       const uint64_t number = at.s * points + k;
-      sum += film_point({at, source, number, i == 0, record, weight * share}, log, rays);
+      Point point{at, source, number, i == 0, record, share};
+      const double own = pixel_filter_weight(scene_.film, filter_, at.x, at.y, even(point, number));
+      point.weight *= own * weight;
+      sum += film_point(point, log, rays) * own;
     }
     all += sum * share;
   }

@@ -11,9 +11,9 @@
 namespace limn {
 
 // Position of one sample of a pixel [pixels of the full film]: drawn from the reconstruction filter
-// around the pixel's center, so that every sample counts with weight one and no pixel shares
-// samples with another. The stream depends on the pixel of the full film, hence a crop repeats the
-// full image. filter: the film's.
+// around the pixel's center, so that every sample counts with weight one (pixel_filter_weight where
+// the filter is negative somewhere) and no pixel shares samples with another. The stream depends on
+// the pixel of the full film, hence a crop repeats the full image. filter: the film's.
 using FilmPosition = Camera::FilmPoint<double>;
 inline FilmPosition sample_pixel_filter(const Film& film, const FilterTable& filter, int x, int y,
                                         const std::array<double, 2>& u) {
@@ -28,6 +28,22 @@ inline FilmPosition sample_pixel_filter(const Film& film, const FilterTable& fil
   Rng rng = key.at(Purpose::kFilm, 0);
   const double u = rng.uniform();
   return sample_pixel_filter(film, filter, x, y, {u, rng.uniform()});
+}
+
+// What the sample counts.
+inline double pixel_filter_weight(const Film& film, const FilterTable& filter, int x, int y,
+                                  const FilmPosition& at) {
+  if (!film.filter.is_signed()) return 1;
+  const auto columns = film.range_x(x);
+  const auto rows = film.range_y(y);
+  return filter.weight(columns.lower, columns.upper, at.x - (x + 0.5)) *
+         filter.weight(rows.lower, rows.upper, at.y - (y + 0.5));
+}
+
+inline double pixel_filter_weight(const Film& film, const FilterTable& filter, int x, int y,
+                                  const Rng& key) {
+  if (!film.filter.is_signed()) return 1;
+  return pixel_filter_weight(film, filter, x, y, sample_pixel_filter(film, filter, x, y, key));
 }
 
 // The same position on the other side of the pixel's center: drawn from the filter like the first,

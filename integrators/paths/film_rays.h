@@ -35,6 +35,11 @@ class FilmRays {
   }
 
   const FilmPosition& place(size_t i) const { return places_[i]; }
+  // See pixel_filter_weight.
+  double weight(const Film& film, const FilterTable& filter, const PixelSample& at,
+                size_t i) const {
+    return pixel_filter_weight(film, filter, at.x, at.y, places_[i]);
+  }
   std::span<const StartRay<double>> starts() const { return {starts_.data(), count_}; }
 
  private:

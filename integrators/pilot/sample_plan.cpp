@@ -62,7 +62,7 @@ std::vector<double> window_largest(const PlanGrid& grid, const std::vector<doubl
 
 // The share of a filter that lies further from its center.
 double share_beyond(const Filter& filter, double distance) {
-  return 2 * filter.integral(-distance) / filter.integral(filter.radius);
+  return 2 * std::fabs(filter.integral(-distance)) / filter.integral(filter.radius);
 }
 
 }  // namespace

@@ -131,7 +131,7 @@ class TermEstimator::PathBatch {
     if (counts) vertices_.emplace_back(estimator_, *counts, nullptr, nullptr, sink_);
     walks_.emplace_back(key, 0, counts ? &vertices_.back() : nullptr);
     walks_.back().field = estimator_.plan_.field_at(place.at);
-    places_.push_back(place);
+    places_.push_back(estimator_.weighed(place, key));
     weights_.push_back(weight);
   }
   void finish() {
@@ -159,6 +159,12 @@ class TermEstimator::PathBatch {
   std::vector<PathStart> places_;
   std::vector<double> weights_;
 };
+
+TermEstimator::PathStart TermEstimator::weighed(PathStart start, const Rng& key) const {
+  if (!start.shared)
+    start.weight = pixel_filter_weight(scene_.film, filter_, start.at.x, start.at.y, key);
+  return start;
+}
 
 void TermEstimator::add_samples(std::span<const KeyedSample> samples,
                                 std::span<const SharedPlace* const> places,
@@ -232,16 +238,17 @@ void TermEstimator::add_logged(const PixelSample& at, const Rng& key, const Shar
   const int paths = paths_ ? static_cast<int>(counts[pixel_slot_]) : 1;
   const int all = paths * places_of_path();
   const auto add = [&](auto& visitor, int i) {
-    const PathStart start{at, i >= paths, shared ? shared + i : nullptr, i};
-    const Path path = trace_one(start, key.path(i % paths), plan_.field_at(at), visitor, sink.log(),
-                                sink.cost(pixel_slot_));
+    const Rng path_key = key.path(i % paths);
+    const PathStart start = weighed({at, i >= paths, shared ? shared + i : nullptr, i}, path_key);
+    const Path path =
+        trace_one(start, path_key, plan_.field_at(at), visitor, sink.log(), sink.cost(pixel_slot_));
     add_path(start, path, 1.0 / all, sink);
   };
   for (int i = 0; i < all; ++i) {
     if (i == 0) {
       VertexTerms vertices(*this, counts, nullptr, nullptr, sink);
       add(vertices, i);
-      add_vertices({at, false, shared}, vertices, sink);
+      add_vertices(weighed({at, false, shared}, key.path(0)), vertices, sink);
     } else {
       PathLog log(*sink.log());
       add(log, i);
@@ -256,7 +263,8 @@ void TermEstimator::add_vertices(const PathStart& start, const VertexTerms& vert
   for (size_t slot = 0; slot < terms_.size(); ++slot) {
     if (!terms_[slot] || !terms_[slot]->uses_vertices()) continue;
     if (is_finite(vertices.sum(slot))) {
-      sink.add(slot, start.at, vertices.sum(slot), 1.0 / vertices.counts()[slot], {start.shared});
+      sink.add(slot, start.at, vertices.sum(slot), start.weight / vertices.counts()[slot],
+               {start.shared});
     } else {
       sink.reject(start.at, slot_name(slot));
     }
@@ -340,6 +348,7 @@ void TermEstimator::add_cost(const PathCosts& costs, size_t paths, TermCost& cos
 void TermEstimator::add_path(const PathStart& start, const Path& path, double weight,
                              SampleSink& sink) const {
   const PixelSample& at = start.at;
+  weight *= start.weight;
   if (!path.finite) {
     sink.reject(at, slot_name(pixel_slot_));
     return;
@@ -415,6 +424,14 @@ TermEstimator::Sample TermEstimator::sample(const PixelSample& at, const Rng& ke
     const Path other = trace_at(true);
     path.found.radiance = (path.found.radiance + other.found.radiance) * 0.5;
     path.finite = path.finite && other.finite;
+  }
+  const double weight = weighed({at}, key).weight;
+  if (weight != 1) {
+    for (PathSums<Dual>* sums : {&path.found, &held.found}) {
+      sums->radiance = sums->radiance * weight;
+      sums->score = sums->score * weight;
+    }
+    vertices.scale(weight);
   }
   const auto split = [&](const Rgb<Lanes>& turning, const Rgb<Lanes>& resting) {
     if (!turns) return TurnedSample{turning, {}, {}};

@@ -134,8 +134,10 @@ class TermEstimator final : public SampleEstimator {
     PixelSample at;
     bool mirrored = false;
     const SharedPlace* shared = nullptr;
-    int number = 0;  // of the path
+    int number = 0;     // of the path
+    double weight = 1;  // pixel_filter_weight of its own place
   };
+  PathStart weighed(PathStart start, const Rng& key) const;
   // places: of shared samples, else empty.
   void add_samples(std::span<const KeyedSample> samples, std::span<const SharedPlace* const> places,
                    SampleSink& sink) const;

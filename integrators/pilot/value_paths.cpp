@@ -50,7 +50,8 @@ void TermEstimator::add_values(std::span<const KeyedSample> samples,
     for (size_t i = 0; i < paths.size(); ++i) {
       PathSums<Dual> sums;
       sums.radiance = found[i].radiance;
-      add_path({paths[i].at, false, shared.empty() ? nullptr : shared[i], numbers[i]},
+      const SharedPlace* place = shared.empty() ? nullptr : shared[i];
+      add_path(weighed({paths[i].at, false, place, numbers[i]}, paths[i].key),
                path_of(sums, found[i].failed), weights[i], sink);
     }
     paths.clear();

@@ -64,6 +64,11 @@ class TermEstimator::VertexTerms {
   const PixelCounts& counts() const { return counts_; }
   const Rgb<Lanes>& sum(size_t slot) const { return sums_[slot]; }
   const Rgb<Lanes>& turned(size_t slot) const { return turned_[slot]; }
+  void scale(double by) {
+    for (size_t slot = 0; slot < estimator_.slots(); ++slot) {
+      for (auto* sums : {&sums_, &turned_, &again_}) (*sums)[slot] = (*sums)[slot] * by;
+    }
+  }
   // Has two other samples at the same vertices, see PairSums. They are not booked.
   void draw_twice() { twice_ = true; }
   const Rgb<Lanes>& again(size_t slot) const { return again_[slot]; }

@@ -63,8 +63,8 @@ class SpeedAgainstFilm {
       }
     }
     for_every_pixel_of(film_, 0.5 * (x0 + x1), 0.5 * (y0 + y1), [&](int x, int y, double weight) {
-      seen += square(x, y) * weight;
-      weights += weight;
+      seen += square(x, y) * std::fabs(weight);
+      weights += std::fabs(weight);
     });
     Lanes result;
     for (int k = 0; k < kLanes; ++k) {

@@ -48,6 +48,15 @@ Layer draw_gaussian(const Filter& filter, const FilterTable& table, const Film::
   return layer;
 }
 
+// Weights that fall and rise have no layers: pairs are drawn by width.
+Layer draw_signed(const Filter& filter, const FilterTable& table, const Film::Range& range,
+                  double u, double v) {
+  const double half = filter.radius * u, across = table.quantile(range.lower, range.upper, v);
+  return {half, across,
+          -filter.slope(half) / filter.eval(0) * filter.radius *
+              table.weight(range.lower, range.upper, across)};
+}
+
 // u, v in [0, 1); range: across the layers.
 Layer draw_layer(const Filter& filter, const FilterTable& table, const Film::Range& range, double u,
                  double v) {
@@ -56,6 +65,9 @@ Layer draw_layer(const Filter& filter, const FilterTable& table, const Film::Ran
       return {filter.radius, table.quantile(range.lower, range.upper, v)};
     case Filter::Kind::kTent:
       return {filter.radius * (1 - u), table.quantile(range.lower, range.upper, v)};
+    case Filter::Kind::kCubic:
+    case Filter::Kind::kLanczos:
+      return draw_signed(filter, table, range, u, v);
     case Filter::Kind::kGaussian:
       break;
   }

@@ -30,8 +30,6 @@ struct Advice {
 
 const std::vector<Advice>& all_advice() {
   static const std::vector<Advice> all = {
-      {{"catmullrom", "lanczos", "mitchell"},
-       "filters with negative weights are not supported: use gaussian"},
       {{"circular", "measured_polarized", "polarizer", "retarder", "stokes"},
        "limn has no polarisation"},
       {{"constvolume", "gridvolume", "heterogeneous", "homogeneous", "medium", "volume"},

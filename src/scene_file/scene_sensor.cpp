@@ -45,6 +45,12 @@ double radius_of_filter(Properties& properties, const std::string& name, double 
   return number;
 }
 
+double part(Properties& properties, const std::string& name, double absent) {
+  const double number = properties.number(name, absent);
+  if (!(number >= 0 && number <= 1)) properties.fail(name, "must lie in [0, 1]");
+  return number;
+}
+
 void read_filter(const ObjectDescription& object, const SceneDescription& scene, Filter& filter) {
   DescribedProperties p(object, scene, kNoMakers);
   if (object.type == "box") {
@@ -54,8 +60,16 @@ void read_filter(const ObjectDescription& object, const SceneDescription& scene,
   } else if (object.type == "gaussian") {
     const double stddev = radius_of_filter(p, "stddev", 0.5);
     filter = {Filter::Kind::kGaussian, 4 * stddev, stddev};
+  } else if (object.type == "mitchell") {
+    filter = cubic_filter(part(p, "B", 1.0 / 3), part(p, "C", 1.0 / 3));
+  } else if (object.type == "catmullrom") {
+    filter = cubic_filter(0, 0.5);
+  } else if (object.type == "lanczos") {
+    const int lobes = bounded_integer(p, "lobes", 3, 1);
+    if (lobes > 1000) p.fail("lobes", "must be at most 1000");
+    filter = lanczos_filter(lobes);
   } else {
-    fail_unknown_type(object, {"box", "gaussian", "tent"});
+    fail_unknown_type(object, {"box", "catmullrom", "gaussian", "lanczos", "mitchell", "tent"});
   }
   p.check_all_used();
 }

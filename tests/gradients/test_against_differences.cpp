@@ -331,7 +331,7 @@ TEST(Paths, FiltersAgree) {
   const TempFiles files;
   SceneParts parts = mixed_scene(files);
   for (const char* film :
-       {R"(<rfilter type="gaussian"/>)",
+       {R"(<rfilter type="gaussian"/>)", R"(<rfilter type="lanczos"/>)",
         R"(<rfilter type="tent"/><boolean name="sample_border" value="true"/>)"}) {
     parts.film = film;
     expect_agreement(make_scene(files, parts), "sensor.rotate.y", 128);

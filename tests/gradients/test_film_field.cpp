@@ -53,6 +53,7 @@ TEST(FilmField, HasTheMeanOfPositionsThatAreHeld) {
   bool mirror = false;
   for (const char* film :
        {R"(<rfilter type="box"/>)", R"(<rfilter type="tent"/>)", R"(<rfilter type="gaussian"/>)",
+        R"(<rfilter type="mitchell"/>)",
         R"(<rfilter type="gaussian"/><boolean name="sample_border" value="true"/>)"}) {
     mirror = !mirror;
     const Scene scene = ball_and_screens(files, film, mirror, !mirror);

@@ -16,9 +16,13 @@
 namespace limn {
 namespace {
 
-const char* const kFilters[] = {R"(<rfilter type="box"/>)", R"(<rfilter type="tent"/>)",
+const char* const kFilters[] = {R"(<rfilter type="box"/>)",
+                                R"(<rfilter type="tent"/>)",
                                 R"(<rfilter type="gaussian"/>)",
                                 R"(<rfilter type="gaussian"/><boolean name="sample_border"
+                                   value="true"/>)",
+                                R"(<rfilter type="mitchell"/>)",
+                                R"(<rfilter type="catmullrom"/><boolean name="sample_border"
                                    value="true"/>)"};
 
 // Edges on the film, of sharp and of soft shadows, in gloss; more at rest than move.
@@ -63,6 +67,8 @@ TEST(FilmMotion, TakesBackWhatItAdds) {
                                        {kFilters[1], false},
                                        {kFilters[2], false},
                                        {kFilters[3], false},
+                                       {kFilters[4], false},
+                                       {kFilters[5], false},
                                        {kFilters[1], true}}) {
     const Scene scene = scene_with(files, filter, 8, mirror);
     const EdgeSamplerType& sampler = edge_sampler_type("silhouettes");

@@ -7,6 +7,8 @@
 
 #include "limn/core/film.h"
 #include "limn/core/rng.h"
+#include "limn/core/vec.h"
+#include "tests/support/compare_moments.h"
 
 namespace limn {
 namespace {
@@ -17,6 +19,21 @@ std::vector<Filter> filters() {
           {Filter::Kind::kTent, 2.5, 0},
           {Filter::Kind::kGaussian, 2, 0.5},
           {Filter::Kind::kGaussian, 4, 1}};
+}
+
+// Those that are negative somewhere.
+std::vector<Filter> signed_filters() {
+  return {cubic_filter(1.0 / 3, 1.0 / 3),
+          cubic_filter(0, 0.5),
+          cubic_filter(1, 0),
+          lanczos_filter(3),
+          lanczos_filter(1),
+          lanczos_filter(4)};
+}
+std::vector<Filter> all_filters() {
+  std::vector<Filter> all = filters();
+  for (const Filter& f : signed_filters()) all.push_back(f);
+  return all;
 }
 
 // Simpson's rule on each side of 0, where the tent has a kink.
@@ -31,7 +48,7 @@ double quadrature(const Filter& f, double a, double b) {
 }
 
 TEST(Filter, IntegralMatchesQuadrature) {
-  for (const Filter& f : filters()) {
+  for (const Filter& f : all_filters()) {
     for (double u : {-0.999, -0.7, -0.2, 0.0, 0.3, 0.9}) {
       const double x = u * f.radius;
       const double expected =
@@ -41,6 +58,60 @@ TEST(Filter, IntegralMatchesQuadrature) {
     }
     EXPECT_EQ(f.integral(-2 * f.radius), 0);
     EXPECT_DOUBLE_EQ(f.integral(2 * f.radius), f.integral(f.radius));
+  }
+}
+
+TEST(Filter, SlopeMatchesDifferences) {
+  for (const Filter& f : all_filters()) {
+    for (const double u : {-0.9, -0.3, -1e-4, 0.2, 0.45, 0.7, 0.99}) {
+      const double x = u * f.radius, h = 1e-6 * f.radius;
+      EXPECT_NEAR(f.slope(x), (f.eval(x + h) - f.eval(x - h)) / (2 * h), 1e-8) << x;
+    }
+  }
+}
+
+// Values of Mitchell and Netravali's paper, and of sines at fractions of pi.
+TEST(Filter, ValuesOfNegativeLobes) {
+  const Filter mitchell = cubic_filter(1.0 / 3, 1.0 / 3), lanczos = lanczos_filter(3);
+  EXPECT_NEAR(mitchell.eval(0), 8.0 / 9, 1e-15);
+  EXPECT_NEAR(mitchell.eval(-1), 1.0 / 18, 1e-15);
+  EXPECT_NEAR(cubic_filter(0, 0.5).eval(1.5), -1.0 / 16, 1e-15);
+  EXPECT_NEAR(lanczos.eval(1.5), -4 / (kPi * kPi) / 3, 1e-15);
+  EXPECT_EQ(lanczos.eval(3), 0);
+  for (const double x : {0.0, 0.1, 0.37}) {
+    double sum = 0;
+    for (int m = -2; m <= 2; ++m) sum += mitchell.eval(x + m);
+    EXPECT_NEAR(sum, 1, 1e-15);
+  }
+}
+
+// Samples' weights add up to the filter's integral over every part of the range.
+TEST(Filter, WeightsOfSamplesAreTheFilter) {
+  constexpr int kParts = 12, kBatches = 500, kOfBatch = 40;
+  uint64_t stream = 0;
+  for (const Filter& f : signed_filters()) {
+    const FilterTable table(f);
+    const double r = f.radius;
+    for (const auto& [lower, upper] : {std::pair{-r, r}, {-0.5, 0.8 * r}, {-0.5, 0.5}}) {
+      const double start = f.integral(lower), total = f.integral(upper) - start;
+      std::vector<double> exact(kParts);
+      const double width = (upper - lower) / kParts;
+      for (int i = 0; i < kParts; ++i) {
+        exact[i] = (f.integral(lower + (i + 1) * width) - f.integral(lower + i * width)) / total;
+      }
+      Rng rng(7, ++stream, 0);
+      Moments moments(kParts);
+      for (int batch = 0; batch < kBatches; ++batch) {
+        std::vector<double> sums(kParts);
+        for (int i = 0; i < kOfBatch; ++i) {
+          const double x = table.quantile(lower, upper, rng.uniform());
+          const auto part = static_cast<int>((x - lower) / width);
+          sums[std::clamp(part, 0, kParts - 1)] += table.weight(lower, upper, x);
+        }
+        moments.add_batch(sums, kOfBatch);
+      }
+      EXPECT_GE(compare_moments(moments, exact).p_largest, 1e-5);
+    }
   }
 }
 

@@ -440,12 +440,11 @@ TEST(SharedPlaces, LeaveSumsTheirVariance) {
 
 // Weights add up to one, and are the filter in the mean: integrals over pixels.
 TEST(SharedPlaces, HaveTheWeightsOfTheFilter) {
-  for (const auto& [kind, radius] : {std::pair{Filter::Kind::kGaussian, 2.0},
-                                     {Filter::Kind::kTent, 1.0},
-                                     {Filter::Kind::kTent, 1.3}}) {
+  for (const Filter& filter :
+       {Filter{Filter::Kind::kGaussian, 2.0}, Filter{Filter::Kind::kTent, 1.0},
+        Filter{Filter::Kind::kTent, 1.3}, cubic_filter(1.0 / 3, 1.0 / 3), lanczos_filter(3)}) {
     Film film;
-    film.filter.kind = kind;
-    film.filter.radius = radius;
+    film.filter = filter;
     const int reach = SharedPlace::reach_of(film), side = 2 * reach + 1;
     ASSERT_GT(reach, 0);
     Moments moments(static_cast<size_t>(side) * side);
@@ -459,7 +458,7 @@ TEST(SharedPlaces, HaveTheWeightsOfTheFilter) {
     }
     const auto share = [&](int m) {
       const Filter& f = film.filter;
-      return (f.integral(m + 0.5) - f.integral(m - 0.5)) / f.integral(radius);
+      return (f.integral(m + 0.5) - f.integral(m - 0.5)) / f.integral(f.radius);
     };
     std::vector<double> exact;
     for (int k = 0; k < side * side; ++k) {
@@ -487,14 +486,35 @@ TEST(SharedPlaces, AreInTheOrderOfNumbers) {
 }
 
 // Pixels whose filters the film cuts have samples of their own.
+// Where a filter is negative their weights vary: with a border, all pixels share.
 TEST(SharedPlaces, LeaveConstantsExact) {
   const TempFiles files;
   SceneParts parts = small_scene(files);
-  parts.film = "<rfilter type=\"gaussian\"/>";
   parts.body = "<emitter type=\"constant\"><rgb name=\"radiance\" value=\"0.7\"/></emitter>";
-  const Moments image =
-      render(make_scene(files, parts), run_settings(3), {.generator = "sobol"}).radiance;
-  for (size_t i = 0; i < image.size(); ++i) EXPECT_NEAR(image.mean(i), 0.7, 1e-12);
+  const std::string border = "<boolean name=\"sample_border\" value=\"true\"/>";
+  for (const std::string& film :
+       {std::string(R"(<rfilter type="gaussian"/>)"), R"(<rfilter type="mitchell"/>)" + border,
+        R"(<rfilter type="catmullrom"/>)" + border, R"(<rfilter type="lanczos"/>)" + border}) {
+    parts.film = film;
+    const Moments image =
+        render(make_scene(files, parts), run_settings(3), {.generator = "sobol"}).radiance;
+    for (size_t i = 0; i < image.size(); ++i) EXPECT_NEAR(image.mean(i), 0.7, 1e-12);
+  }
+}
+
+// Samples of a pixel's own agree with shared ones, also where the film cuts a filter.
+TEST(SharedPlaces, OfNegativeLobesAgreeWithOwnSamples) {
+  const TempFiles files;
+  SceneParts parts = small_scene(files);
+  for (const char* film : {R"(<rfilter type="mitchell"/>)", R"(<rfilter type="lanczos"/>)"}) {
+    parts.film = film;
+    const Scene scene = make_scene(files, parts);
+    RunSettings settings = run_settings(512);
+    const Moments shared = render(scene, settings, {.generator = "sobol"}).radiance;
+    settings.seed = 7;
+    const Moments own = render(scene, settings, {.generator = "independent"}).radiance;
+    EXPECT_GE(compare_moments(shared, own).p_largest, 1e-5) << film;
+  }
 }
 
 TEST(Seeds, Matter) {

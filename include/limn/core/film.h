@@ -8,33 +8,50 @@
 
 namespace limn {
 
-// A separable reconstruction filter, as in Mitsuba 3: box, tent, gaussian.
+// A separable reconstruction filter, as in Mitsuba 3.
 struct Filter {
-  enum class Kind { kBox, kTent, kGaussian };
+  enum class Kind { kBox, kTent, kGaussian, kCubic, kLanczos };
   Kind kind = Kind::kGaussian;
   double radius = 2;    // pixels; the filter is 0 outside
   double stddev = 0.5;  // gaussian only
+  double b = 0, c = 0;  // cubic only: Mitchell and Netravali's (1988) parameters
+  double half = 0;      // lanczos only: integral from 0 to the radius
 
   double eval(double x) const;
+  double slope(double x) const;  // the derivative of eval; at a tent's tip 0
   // Integral of the filter from -radius to x.
   double integral(double x) const;
+  // Whether it may be negative somewhere.
+  bool is_signed() const { return kind == Kind::kCubic || kind == Kind::kLanczos; }
   // The inverse of the filter's cumulative distribution on [lower, upper]: the offset below which
   // the fraction u of the filter's integral over [lower, upper] lies. That integral must be
-  // positive. Exact to rounding; FilterTable is faster for many.
+  // positive, and the filter nowhere negative. Exact to rounding; FilterTable is faster for many.
   double quantile(double lower, double upper, double u) const;
 };
 
+Filter cubic_filter(double b, double c);
+Filter lanczos_filter(int lobes);
+
 // A table of filter quantiles: piecewise polynomials in the integral up to x < 0. Each power of two
-// has the same number of knots, since x varies as the root of the integral near the end.
+// has the same number of knots, since x varies as the root of the integral near the end. For a
+// filter that is negative somewhere, a density that is constant in narrow bins, near the filter's
+// magnitude there.
 class FilterTable {
  public:
   explicit FilterTable(const Filter& filter);
 
-  // Filter::quantile to rounding. For u uniform in [0, 1) it gives an offset with the density
-  // eval(x) / (integral(upper) - integral(lower)).
+  // Filter::quantile to rounding, or that of the bins. For u uniform in [0, 1) it gives an offset
+  // with the density pdf [1 / pixel], of which eval(x) / (integral(upper) - integral(lower)) is
+  // `weight` times as much: 1 but for bins.
   double quantile(double lower, double upper, double u) const;
+  double pdf(double lower, double upper, double x) const;
+  double weight(double lower, double upper, double x) const;
 
  private:
+  // Of bins: the integral of their density, up to a factor, from -radius to x.
+  static constexpr int kBins = 32;  // per pixel
+  double mass(double x) const;
+
   // With these, a gaussian's error is of the size of rounding.
   static constexpr int kNodes = 9;      // per piece
   static constexpr int kPieceBits = 3;  // log2 of the pieces per power of two
@@ -45,7 +62,8 @@ class FilterTable {
 
   Filter filter_;
   double total_;               // integral of the whole filter
-  std::vector<Piece> pieces_;  // Newton's divided differences; none for a box
+  std::vector<Piece> pieces_;  // Newton's divided differences; none for a box and bins
+  std::vector<double> upto_;   // mass at the beginning of each bin, and at the end
 };
 
 // A pixel's value is the filter's weighted mean of the radiance over the film. I_j is the integral
