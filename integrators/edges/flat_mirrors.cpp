@@ -17,7 +17,7 @@ constexpr double kFlat = 0x1p-16;
 
 Rgb<double> reflectance(const Shape& shape, bool front) {
   const Bsdf* side = shape.bsdf->side(front);
-  if (!side || !side->lobes().smooth) return {};
+  if (!side || !side->lobes().smooth || shape.bsdf->maps_normals()) return {};
   const Vec3d n{0, 0, 1};
   SmoothRays<double> rays;
   const int count = side->smooth_rays(n, n, rays);

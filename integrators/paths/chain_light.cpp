@@ -66,12 +66,14 @@ bool values_move(const Scene& seeded) {
     if (framed && !is_constant(framed->corners().front())) return true;
   }
   const Vec3<Dual> n{0.0, 0.0, 1.0}, wi{0.6, 0.0, 0.8};
+  Rgb<Dual> at[kMostTextures];  // any values
+  std::ranges::fill(at, grey(Dual(0.5)));
   for (const Shape& shape : seeded.shapes) {
     for (const bool front : {true, false}) {
       const Bsdf* const side = shape.bsdf->side(front);
-      if (!side || !side->lobes().smooth || side->texture_count() > 0) continue;
+      if (!side || !side->lobes().smooth) continue;
       SmoothRays<Dual> rays;
-      const int count = side->smooth_rays(n, wi, rays);
+      const int count = side->smooth_rays(n, wi, rays, at);
       for (int k = 0; k < count; ++k) {
         if (!is_constant(rays[k].wo)) return true;
       }
