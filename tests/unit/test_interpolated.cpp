@@ -232,7 +232,7 @@ double difference(const Image& a, const Image& b) {
 
 // Of fewer faces than the bodies above.
 Scene ring(const TempFiles& files, const std::string& lights, bool smooth) {
-  return over_floor(files, {{torus_mesh(12, 6), 0.8, {0.2, 1.1, 0}}}, smooth, lights);
+  return over_floor(files, {{torus_mesh(8, 4), 0.8, {0.2, 1.1, 0}}}, smooth, lights);
 }
 
 TEST(Interpolated, ImagesAreThoseOfLines) {
