@@ -496,7 +496,8 @@ def test_the_same_seed_finds_the_same(egg):
     positions, faces = visual_hull(views, 24)
     found = []
     for threads in (1, 2):
-        fit = PhotoFit(Model(positions, faces, np.full((len(positions), 3), 0.5)), views, 3, threads)
+        model = Model(positions, faces, np.full((len(positions), 3), 0.5)).remeshed(400)
+        fit = PhotoFit(model, views, 3, threads)
         fit.run(Plan(0, 2), "all")
         found.append((fit.model.positions, fit.model.colours, fit.model.sky))
     for one, other in zip(*found):
@@ -536,10 +537,11 @@ def test_colours_are_baked_where_texture_coordinates_are():
 
 def test_the_program_starts_it(egg):
     words = ["reconstruct", str(egg), "-o", str(egg / "out"), "--minutes", "0.02", "--size", "16"]
-    for start in ([sys.executable, "-m", "limn"], [os.environ["LIMN_PROGRAM"]]):
-        done = subprocess.run([*start, *words], capture_output=True, text=True, check=False)
-        assert done.returncode == 0, done.stderr
-        assert "report.html" in done.stdout
+    program = [os.environ["LIMN_PROGRAM"]]  # starts the other
+    done = subprocess.run([*program, *words], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "report.html" in done.stdout
+    for start in ([sys.executable, "-m", "limn"], program):
         done = subprocess.run([*start, "reconstruct", str(egg / "images"), "-o", str(egg / "x")],
                               capture_output=True, text=True, check=False)  # fmt: skip
         assert done.returncode == 2 and "has no cameras" in done.stderr
