@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 
 #include "limn/core/make_bsdf.h"
 #include "src/bsdf/both_scalars.h"
@@ -23,8 +24,8 @@ class RoughConductor final : public BothScalars<RoughConductor, Bsdf> {
         alpha_(number(v.alpha_v ? "alpha_u" : "alpha", v.alpha)),
         alpha_v_(v.alpha_v ? number("alpha_v", *v.alpha_v) : BsdfNumber{}),
         tangent_(v.alpha_v ? add_tangent("alpha_u") : -1),
-        eta_(v.eta),
-        k_(v.k),
+        eta_(colour("eta", v.eta)),
+        k_(colour("k", v.k)),
         specular_reflectance_(colour("specular_reflectance", v.specular_reflectance)) {}
 
   double pdf_solid_angle(const Vec3d& n, const Vec3d& wi, const Vec3d& wo,
@@ -49,13 +50,16 @@ class RoughConductor final : public BothScalars<RoughConductor, Bsdf> {
 
   bool is_constant() const override {
     return limn::is_constant(alpha_.constant) && limn::is_constant(alpha_v_.constant) &&
-           limn::is_constant(specular_reflectance_.constant);
+           index_is_constant() && limn::is_constant(specular_reflectance_.constant);
   }
   LobeSummary lobe(const Rgb<double>* at) const override;
   std::vector<ParameterRef> parameters() override {
     std::vector<ParameterRef> list;
     add_parameter(is_anisotropic() ? "alpha_u" : "alpha", alpha_, 0, kMaximumAlpha, list);
     if (is_anisotropic()) add_parameter("alpha_v", alpha_v_, 0, kMaximumAlpha, list);
+    constexpr double kMost = std::numeric_limits<double>::infinity();
+    add_parameter("eta", eta_, 0, kMost, list);
+    add_parameter("k", k_, 0, kMost, list);
     add_parameter("specular_reflectance", specular_reflectance_, 0, 1, list);
     return list;
   }
@@ -73,6 +77,9 @@ class RoughConductor final : public BothScalars<RoughConductor, Bsdf> {
  private:
   bool is_ggx() const { return distribution_ == Distribution::kGgx; }
   bool is_anisotropic() const { return tangent_ >= 0; }
+  bool index_is_constant() const {
+    return limn::is_constant(eta_.constant) && limn::is_constant(k_.constant);
+  }
   template <class S>
   static S alpha(const BsdfNumber& number, const Rgb<S>* at) {
     const S a = number.of(at);
@@ -100,14 +107,22 @@ class RoughConductor final : public BothScalars<RoughConductor, Bsdf> {
   Distribution distribution_;
   BsdfNumber alpha_, alpha_v_;
   int tangent_;  // where it stands in `at`; -1 if isotropic
-  Rgb<double> eta_, k_;
-  BsdfColour specular_reflectance_;
+  BsdfColour eta_, k_, specular_reflectance_;
 };
 
 template <class S, class T>
 Rgb<S> RoughConductor::coloured(const S& cos_h, const S& common, const Rgb<T>& specular) const {
+  const Rgb<Dual>&n = eta_.constant, &m = k_.constant;
+  if constexpr (std::is_same_v<S, Dual>) {
+    if (!index_is_constant()) {
+      Rgb<S> reflectance;
+      for (int c = 0; c < 3; ++c)
+        reflectance[c] = microfacet::fresnel_conductor(cos_h, n[c], m[c]);
+      return specular * reflectance * common;
+    }
+  }
   // Arrays of four, so that the compiler vectorises doubles.
-  const double eta[4] = {eta_.r, eta_.g, eta_.b, 1}, k[4] = {k_.r, k_.g, k_.b, 1};
+  const double eta[4] = {n.r.v, n.g.v, n.b.v, 1}, k[4] = {m.r.v, m.g.v, m.b.v, 1};
   constexpr int kCount = std::is_same_v<S, double> ? 4 : 3;
   S f[kCount];
   for (int i = 0; i < kCount; ++i) f[i] = microfacet::fresnel_conductor(cos_h, eta[i], k[i]);
@@ -177,10 +192,10 @@ LobeSummary RoughConductor::lobe(const Rgb<double>* at) const {
 }
 
 std::string RoughConductor::describe() const {
-  std::string text = fmt::format(
-      "roughconductor, {}, alpha {}{}, eta {:g} {:g} {:g}, k {:g} {:g} {:g}",
-      is_ggx() ? "ggx" : "beckmann", text_of(alpha_),
-      is_anisotropic() ? " by " + text_of(alpha_v_) : "", eta_.r, eta_.g, eta_.b, k_.r, k_.g, k_.b);
+  std::string text =
+      fmt::format("roughconductor, {}, alpha {}{}, eta {}, k {}", is_ggx() ? "ggx" : "beckmann",
+                  text_of(alpha_), is_anisotropic() ? " by " + text_of(alpha_v_) : "",
+                  text_of(eta_), text_of(k_));
   if (specular_reflectance_.texture >= 0) {
     text += ", specular_reflectance " + text_of(specular_reflectance_);
   }

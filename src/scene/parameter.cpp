@@ -14,6 +14,35 @@ namespace limn {
 
 namespace {
 
+std::optional<Parameter> find_own(const std::vector<Parameter>& list, const Scene& scene,
+                                  const std::string& name) {
+  for (const Parameter& p : list) {
+    if (p.name == name) {
+      Parameter found = p;
+      if (const auto held = p.motion->held(scene)) found.motion = held;
+      return found;
+    }
+    if (!name.starts_with(p.name)) continue;
+    if (auto part = p.motion->part(scene, p, name.substr(p.name.size()))) return part;
+  }
+  return std::nullopt;
+}
+
+// The same, by Mitsuba's name: it counts what is nested.
+std::optional<Parameter> find_nested(const std::vector<Parameter>& list, const Scene& scene,
+                                     const std::string& name) {
+  if (auto found = find_own(list, scene, name)) return found;
+  constexpr std::pair<std::string_view, std::string_view> kParts[] = {
+      {".nested_bsdf.", "."}, {".brdf_0.", "."}, {".brdf_0.", ".front."}, {".brdf_1.", ".back."}};
+  for (const auto& [mitsuba, own] : kParts) {
+    const size_t at = name.find(mitsuba);
+    if (at == std::string::npos) continue;
+    const std::string here = std::string(name).replace(at, mitsuba.size(), own);
+    if (auto found = find_nested(list, scene, here)) return found;
+  }
+  return std::nullopt;
+}
+
 [[noreturn]] void fail_unknown(const Scene& scene, const std::string& name,
                                const std::vector<Parameter>& list) {
   std::vector<std::string> names;
@@ -159,23 +188,11 @@ std::vector<Parameter> list_parameters(const Scene& scene) {
 
 Parameter find_parameter_or_array(const Scene& scene, const std::string& name) {
   constexpr std::string_view kOneValue = ".value";
-  if (name.ends_with(kOneValue)) {
-    const std::string stem = name.substr(0, name.size() - kOneValue.size());
-    if (stem.ends_with(kOneValue)) fail_unknown(scene, name, list_parameters(scene));
-    Parameter found = find_parameter_or_array(scene, stem);
-    found.name = name;  // results are looked up by the name that was given
-    return found;
-  }
+  const size_t size = name.size() - (name.ends_with(kOneValue) ? kOneValue.size() : 0);
   const std::vector<Parameter> list = list_parameters(scene);
-  for (const Parameter& p : list) {
-    if (p.name == name) {
-      Parameter found = p;
-      if (const auto held = p.motion->held(scene)) found.motion = held;
-      return found;
-    }
-    if (!name.starts_with(p.name)) continue;
-    const auto part = p.motion->part(scene, p, name.substr(p.name.size()));
-    if (part) return *part;
+  if (auto found = find_nested(list, scene, name.substr(0, size))) {
+    found->name = name;  // results are looked up by the name that was given
+    return *found;
   }
   if (has_texel_borders(scene)) check_nothing_moves(scene, name);
   fail_unknown(scene, name, list);

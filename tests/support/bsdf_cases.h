@@ -62,6 +62,7 @@ inline void add_mapped(std::vector<BsdfCase>& cases) {
   RoughConductorValues glossy;
   glossy.distribution = RoughConductorValues::Distribution::kGgx;
   glossy.alpha = 0.5;
+  glossy.eta = {0.2010, 0.9237, 1.1022};
   const auto make = [&](const char* type, std::shared_ptr<Bsdf> inside) {
     TestProperties properties("bsdf", type, {}, {std::move(inside)});
     properties.textures["normalmap"] = make_texture(texture);

@@ -22,7 +22,8 @@ class Parameters : public testing::Test {
     const std::string file = files_.write("s.xml", R"(<scene version="3.0.0">
       <sensor type="perspective"><float name="fov" value="40"/><transform name="to_world">
         <lookat origin="1,2,5" target="0,0.5,0" up="0,1,0"/></transform></sensor>
-      <bsdf type="roughconductor" id="metal"><float name="alpha" value="0.2"/></bsdf>
+      <bsdf type="roughconductor" id="metal"><float name="alpha" value="0.2"/>
+        <string name="material" value="Cu"/></bsdf>
       <bsdf type="twosided" id="both"><ref id="metal"/></bsdf>
       <shape type="obj" id="tent"><string name="filename" value="smooth.obj"/><ref id="both"/>
       </shape>
@@ -320,6 +321,25 @@ TEST_F(Parameters, WhatHasNoIdIsNamedByItsFileOrType) {
   EXPECT_EQ(red("disk.emitter.radiance"), 3);
   EXPECT_EQ(scene.bsdfs_by_id.at("cube_1"), scene.shapes[3].bsdf);
   EXPECT_FALSE(scene.bsdfs_by_id.contains("cube_3.bsdf"));
+}
+
+TEST_F(Parameters, MitsubasNamesCountWhatIsNested) {
+  files_.write("nested.xml", R"(<scene version="3.0.0"><sensor type="perspective"/>
+      <shape type="cube" id="one"><bsdf type="mask"><bsdf type="twosided"><bsdf type="diffuse">
+        <rgb name="reflectance" value="0.25"/></bsdf></bsdf></bsdf></shape>
+      <bsdf type="twosided" id="two"><bsdf type="diffuse"/>
+        <bsdf type="diffuse"><rgb name="reflectance" value="0.75"/></bsdf></bsdf></scene>)");
+  const Scene scene = read_scene(files_.path("nested.xml"), {}, nullptr);
+  for (const auto& [name, value] :
+       {std::pair{"one.bsdf.nested_bsdf.brdf_0.reflectance.value", 0.25},
+        {"one.bsdf.brdf_0.reflectance.r", 0.25},
+        {"two.brdf_0.reflectance.value", 0.5},
+        {"two.brdf_1.reflectance", 0.75}}) {
+    const Parameter found = find_parameter_or_array(scene, name);
+    EXPECT_EQ(found.name, name);
+    EXPECT_EQ(found.value(scene)[0], value);
+  }
+  EXPECT_THROW(find_parameter_or_array(scene, "one.bsdf.brdf_1.reflectance"), InputError);
 }
 
 std::string message_of(const Scene& scene, const std::string& name) {
