@@ -509,18 +509,24 @@ class TermJob {
       figures[t].least = types_[t]->least_samples;
       if (method_.spreads_samples && t != estimator.pixel_slot()) figures[t].least = kLeastSamples;
       figures[t].on_film = !pilot.in_cells(t);
-      if (pilot.in_cells(t)) figures[t].cells.resize(pilot.grid.size());
+      if (!pilot.in_cells(t)) continue;
+      figures[t].cells.resize(pilot.grid.size());
+      figures[t].cells_squared.resize(pilot.grid.size());
     }
     for (int lane = 0; lane < estimator.lanes(); ++lane) {
-      std::vector<std::vector<double>> cells;
-      const std::vector<double> means = probed.variances(lane, cells);
+      const Probed::Spread spread = probed.spread(lane);
+      const std::vector<double>& means = spread.variances;
       const double sum = std::accumulate(means.begin(), means.end(), 0.0);
       units.push_back(sum);
       if (!(sum > 0)) continue;
       for (size_t t = 0; t < figures.size(); ++t) {
         add_shares(pilot.shares(t, lane), means[t] / sum, figures[t]);
         figures[t].variance += means[t] / sum;
-        for (size_t i = 0; i < cells[t].size(); ++i) figures[t].cells[i] += cells[t][i] / sum;
+        figures[t].squared_mean += spread.squared_means[t] / sum;
+        for (size_t i = 0; i < spread.cells[t].size(); ++i) {
+          figures[t].cells[i] += spread.cells[t][i] / sum;
+          figures[t].cells_squared[i] += spread.cells_squared[t][i] / sum;
+        }
       }
     }
     return figures;

@@ -35,6 +35,7 @@ struct Wish {
   std::vector<double> cells;     // where they are 1 or more
   std::vector<double> rare;      // where they are less
   std::vector<double> variance;  // of the same cells, smoothed
+  std::vector<double> squared;   // mean, the same
 };
 
 void raise_to_least_share(std::vector<double>& counts) {
@@ -49,22 +50,26 @@ Wish wish_of(const TermFigures& term, const PlanGrid& grid) {
   Wish wish;
   if (term.cells.empty()) return wish;
   wish.variance.assign(grid.size(), 0);
+  wish.squared.assign(grid.size(), 0);
   wish.cells.assign(grid.size(), 0);
   wish.rare.assign(grid.size(), 0);
   // What a pilot has not seen may be there: one sample, whatever the scale.
   if (!(term.variance > 0)) return wish;
-  for (const int radius : kSpreadRadii) {
-    const std::vector<double> means = window_means(grid, term.cells, radius);
-    for (size_t i = 0; i < grid.size(); ++i) {
-      wish.variance[i] += std::max(means[i], 0.0) / std::size(kSpreadRadii);
+  const auto smooth = [&](const std::vector<double>& values, std::vector<double>& to) {
+    for (const int radius : kSpreadRadii) {
+      const std::vector<double> means = window_means(grid, values, radius);
+      for (size_t i = 0; i < grid.size(); ++i)
+        to[i] += std::max(means[i], 0.0) / std::size(kSpreadRadii);
     }
-  }
+  };
+  smooth(term.cells, wish.variance);
+  if (!term.cells_squared.empty()) smooth(term.cells_squared, wish.squared);
   if (!(term.cost > 0)) return wish;
   const auto& [kept, power] = term.shares;
   for (size_t i = 0; i < grid.size(); ++i) {
     const double drawn = wish.variance[i] * (1 - kept) * power;
     wish.cells[i] = std::pow(drawn / (term.cost - term.first), 1 / (power + 1));
-    wish.rare[i] = std::sqrt(wish.variance[i] / term.cost);
+    wish.rare[i] = std::sqrt((wish.variance[i] + wish.squared[i]) / term.cost);
   }
   raise_to_least_share(wish.cells);
   raise_to_least_share(wish.rare);
@@ -104,7 +109,7 @@ Totals totals_of_cells(const std::vector<TermFigures>& terms, const std::vector<
     const double each = 1.0 / static_cast<double>(wishes[t].cells.size());
     for (size_t i = 0; i < wishes[t].cells.size(); ++i) {
       const double n = possible(terms[t], wishes[t], i, scale);
-      totals.error += each * wishes[t].variance[i] * terms[t].left_by(n);
+      totals.error += each * terms[t].left_by(n, wishes[t].variance[i], wishes[t].squared[i]);
       totals.cost += each * terms[t].cost_of(n);
     }
   }
@@ -119,7 +124,7 @@ double best_on_film(const TermFigures& term, const Totals& others, double most) 
   constexpr double kStep = 1.189207115002721;  // the fourth root of 2
   const auto cost = [&](double n) { return others.cost + term.cost_of(n); };
   const auto product = [&](double n) {
-    return (others.error + term.variance * term.left_by(n)) * cost(n);
+    return (others.error + term.left_by(n)) * cost(n);
   };
   double least = std::numeric_limits<double>::infinity();
   for (double n = term.least; n <= kMostInPixel; n *= kStep) least = std::min(least, product(n));
@@ -133,7 +138,7 @@ ScaledPlan plan_at(const std::vector<TermFigures>& terms, const std::vector<Wish
   ScaledPlan plan{totals_of_cells(terms, wishes, scale), std::vector<double>(terms.size())};
   Totals& sum = plan.totals;
   const auto add = [&](size_t t, double sign) {
-    sum.error += sign * terms[t].variance * terms[t].left_by(plan.film[t]);
+    sum.error += sign * terms[t].left_by(plan.film[t]);
     sum.cost += sign * terms[t].cost_of(plan.film[t]);
   };
   for (size_t t = 0; t < terms.size(); ++t) {
@@ -225,11 +230,11 @@ SampleCounts best_samples(const std::vector<TermFigures>& figures, double most) 
     const TermFigures& term = figures[t];
     const std::vector<double> counts = counts_to_try(term);
     samples.push_back(counts.front());
-    variance += term.variance * term.left_by(counts.front());
+    variance += term.left_by(counts.front());
     cost += term.cost_of(counts.front());
     for (size_t i = 1; i < counts.size(); ++i) {
       const double fewer = counts[i - 1], more = counts[i];
-      const double lost = term.variance * (term.left_by(fewer) - term.left_by(more));
+      const double lost = term.left_by(fewer) - term.left_by(more);
       steps.push_back({lost / (term.cost_of(more) - term.cost_of(fewer)), t, more});
     }
   }
@@ -239,7 +244,7 @@ SampleCounts best_samples(const std::vector<TermFigures>& figures, double most) 
   std::vector<double> best = samples;
   for (const Step& step : steps) {
     const TermFigures& term = figures[step.term];
-    variance += term.variance * (term.left_by(step.count) - term.left_by(samples[step.term]));
+    variance += term.left_by(step.count) - term.left_by(samples[step.term]);
     cost += term.cost_of(step.count) - term.cost_of(samples[step.term]);
     samples[step.term] = step.count;
     if (cost > most) break;
@@ -282,7 +287,7 @@ namespace {
 Totals totals_of(const std::vector<TermFigures>& figures, const SampleCounts& counts) {
   Totals totals;
   for (size_t t = 0; t < figures.size(); ++t) {
-    totals.error += figures[t].variance * figures[t].left_by(counts[t]);
+    totals.error += figures[t].left_by(counts[t]);
     totals.cost += figures[t].cost_of(counts[t]);
   }
   return totals;

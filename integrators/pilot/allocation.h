@@ -33,12 +33,17 @@ struct TermFigures {
   double first = 0;
   DrawShares shares = {};  // of the variance
   bool on_film = false;    // its samples are stratified over the film, also where they are few
+  // Of the sample's mean, as a mean over pixels and in every cell. A term that a path leaves out
+  // adds 0: less than one sample adds this to the variance.
+  double squared_mean = 0;
+  std::vector<double> cells_squared = {};
 
-  // Of the variance, what so many samples leave.
-  double left_by(double samples) const {
-    if (samples <= 1 && !on_film) return 1 / samples;
-    return shares.kept + (1 - shares.kept) * std::pow(samples, -shares.power);
+  // What so many samples leave of the variance of one, where that is `own` and the squared mean so.
+  double left_by(double samples, double own, double squared) const {
+    if (samples < 1 && !on_film) return (own + squared) / samples - squared;
+    return own * (shares.kept + (1 - shares.kept) * std::pow(samples, -shares.power));
   }
+  double left_by(double samples) const { return left_by(samples, variance, squared_mean); }
 
   double cost_of(double samples) const {
     return cost * samples - first * std::max(samples - 1, 0.0);

@@ -208,11 +208,17 @@ class PilotRun {
 }  // namespace
 
 std::vector<double> PilotFigures::variances(size_t slot, int lane) const {
+  return both_halves(slot, [&](const Covariances& c) { return c.variance(lane); });
+}
+std::vector<double> PilotFigures::squared_means(size_t slot, int lane) const {
+  return both_halves(slot, [&](const Covariances& c) { return c.squared_mean(lane); });
+}
+
+template <class Function>
+std::vector<double> PilotFigures::both_halves(size_t slot, const Function& of) const {
   std::vector<double> result;
-  for (size_t cell = 0; cell < grid.size(); ++cell) {
-    result.push_back(0.5 *
-                     (halves[0][slot][cell].variance(lane) + halves[1][slot][cell].variance(lane)));
-  }
+  for (size_t cell = 0; cell < grid.size(); ++cell)
+    result.push_back(0.5 * (of(halves[0][slot][cell]) + of(halves[1][slot][cell])));
   return result;
 }
 

@@ -32,6 +32,7 @@ struct PilotFigures {
   std::vector<Lanes> film_kept;   // the same; 0 where samples have no times
   // Of one sample of a slot, in every cell.
   std::vector<double> variances(size_t slot, int lane) const;
+  std::vector<double> squared_means(size_t slot, int lane) const;
   std::vector<PairSums> pairs;     // of every slot; of none but those at vertices
   TracedDraws traced;              // of edges at vertices
   std::vector<double> work;        // of one sample of a pixel, of every slot, see Term::work
@@ -52,6 +53,10 @@ struct PilotFigures {
   bool in_cells(size_t slot) const { return !halves[0][slot].empty(); }
   // Figures of other samples of the same pixels; once.
   void merge(const PilotFigures& more);
+
+ private:
+  template <class Function>
+  std::vector<double> both_halves(size_t slot, const Function& of) const;
 };
 
 // Of the samples of a probed pixel: an even number. pixels: so many are probed, about.

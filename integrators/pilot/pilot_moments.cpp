@@ -25,6 +25,7 @@ void CellSums::add(size_t cell, const TurnedSample& sample) {
     for (int k = kUnknowns; k < kUnknowns + parameters_; ++k) {
       *second++ += x[k] * x[k];
       for (int i = 0; i < kUnknowns; ++i) *second++ += x[k] * x[i];
+      ++second;  // the squared mean
     }
   }
 }
@@ -46,8 +47,11 @@ CellCovariances CellSums::take(int samples) {
       for (int j = 0; j <= i; ++j) subtract_means(*second++, i, j);
     }
     for (int k = kUnknowns; k < kUnknowns + parameters_; ++k) {
-      subtract_means(*second++, k, k);
+      float& variance = *second++;
+      const float squares = variance;
+      subtract_means(variance, k, k);
       for (int i = 0; i < kUnknowns; ++i) subtract_means(*second++, k, i);
+      *second++ = squares / n - variance;
     }
   }
   CellCovariances result = std::exchange(second_, CellCovariances(cells_, parameters_));

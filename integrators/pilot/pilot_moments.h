@@ -26,18 +26,20 @@ class Covariances {
   float of(int i, int j) const { return i < j ? of(j, i) : entries_[i * (i + 1) / 2 + j]; }
   float variance(int parameter) const { return own(parameter)[0]; }
   float with(int parameter, int unknown) const { return own(parameter)[1 + unknown]; }
+  // Of the mean, unbiased: it may be negative.
+  float squared_mean(int parameter) const { return own(parameter)[1 + kUnknowns]; }
 
   static size_t size(int parameters) {
-    return kShared + static_cast<size_t>(parameters) * (1 + kUnknowns);
+    return kShared + static_cast<size_t>(parameters) * kOwn;
   }
 
  private:
-  static constexpr size_t kShared = kUnknowns * (kUnknowns + 1) / 2;
+  static constexpr size_t kShared = kUnknowns * (kUnknowns + 1) / 2, kOwn = kUnknowns + 2;
   const float* own(int parameter) const {
-    return entries_ + kShared + static_cast<size_t>(parameter) * (1 + kUnknowns);
+    return entries_ + kShared + static_cast<size_t>(parameter) * kOwn;
   }
-  // The lower triangle of the unknowns, then for every parameter its variance and its covariances
-  // with them.
+  // The lower triangle of the unknowns, then for every parameter its variance, its covariances with
+  // them, and its squared mean.
   const float* entries_;
 };
 

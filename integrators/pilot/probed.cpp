@@ -8,37 +8,45 @@
 
 namespace limn {
 
-std::vector<double> Probed::variances(int lane, std::vector<std::vector<double>>& cells,
-                                      bool turned) const {
+Probed::Spread Probed::spread(int lane, bool turned) const {
   const bool fitted = turned && !fit.variances.empty();
   const size_t slots = pilot.work.size();
-  std::vector<double> means(slots);
-  cells.assign(slots, {});
+  Spread result{std::vector<double>(slots), std::vector<double>(slots),
+                std::vector<std::vector<double>>(slots), std::vector<std::vector<double>>(slots)};
   for (size_t slot = 0; slot < slots; ++slot) {
     const double film = pilot.film_variance[slot][lane];
-    means[slot] = film;
+    result.variances[slot] = film;
     if (!pilot.in_cells(slot)) continue;
     // Some terms have samples of both kinds.
-    cells[slot] = fitted ? fit.variances[lane][slot] : pilot.variances(slot, lane);
-    means[slot] += shared * trimmed_mean(cells[slot]);
-    for (double& cell : cells[slot]) cell = shared * cell + film;
+    const std::vector<double> held = pilot.variances(slot, lane);
+    std::vector<double>&cells = result.cells[slot], &squared = result.cells_squared[slot];
+    cells = fitted ? fit.variances[lane][slot] : held;
+    squared = pilot.squared_means(slot, lane);
+    // A turn that takes a share of the variance is taken to do so with the squared mean.
+    for (size_t i = 0; i < cells.size(); ++i) {
+      if (cells[i] < held[i]) squared[i] *= std::max(cells[i], 0.0) / held[i];
+      squared[i] *= shared;
+    }
+    result.variances[slot] += shared * trimmed_mean(cells);
+    result.squared_means[slot] = std::max(trimmed_mean(squared), 0.0);
+    for (double& cell : cells) cell = shared * cell + film;
   }
-  return means;
+  return result;
 }
 
 double Probed::error_times_work(int parameters, bool turned) const {
   double product = 1;
   for (int lane = 0; lane < parameters; ++lane) {
-    std::vector<std::vector<double>> cells;
-    const std::vector<double> means = variances(lane, cells, turned);
-    std::vector<TermFigures> figures(means.size());
-    for (size_t slot = 0; slot < means.size(); ++slot) {
-      figures[slot] = {.variance = std::max(means[slot], 0.0),
+    const Spread spread = this->spread(lane, turned);
+    std::vector<TermFigures> figures(spread.variances.size());
+    for (size_t slot = 0; slot < figures.size(); ++slot) {
+      figures[slot] = {.variance = std::max(spread.variances[slot], 0.0),
                        .cost = pilot.work[slot],
                        .least = slot == pilot.pixel_slot ? 1 : kLeastSamples,
                        .first = pilot.first_work[slot],
                        .shares = pilot.shares(slot, lane),
-                       .on_film = !pilot.in_cells(slot)};
+                       .on_film = !pilot.in_cells(slot),
+                       .squared_mean = spread.squared_means[slot]};
     }
     product *= std::pow(least_error_times_cost(figures), 1.0 / parameters);
   }

@@ -13,10 +13,13 @@ struct Probed {
   FieldFit fit;       // empty where turns are not looked at
   double shared = 1;  // of a pixel's variance by its own samples, what sharing them leaves
 
-  // The variance of one sample of every slot, of a parameter: the mean over the film, and in cells
-  // where it has them.
-  std::vector<double> variances(int lane, std::vector<std::vector<double>>& cells,
-                                bool turned = true) const;
+  // Of one sample of every slot, of a parameter: the mean over the film, and in cells where it has
+  // them.
+  struct Spread {
+    std::vector<double> variances, squared_means;
+    std::vector<std::vector<double>> cells, cells_squared;
+  };
+  Spread spread(int lane, bool turned = true) const;
   // After equal time, where samples are shared out best among terms: of so many parameters, as a
   // geometric mean; 0 where nothing of one was seen. turned: directions turn as fitted.
   double error_times_work(int parameters, bool turned = true) const;

@@ -11,7 +11,7 @@ namespace {
 // four emitters on gloss, where the list is long: what is left is the error of p within its pixel.
 constexpr int kPoints = 4;
 // Emitters are small below this angle [rad], and have few sides up to this number. Not tuned.
-constexpr double kSmall = 0.1;
+constexpr double kSmall = 1e9;
 constexpr int kMostSides = 8;
 
 DirectPoint point_at(const DirectPieces::Piece& piece, double u, double times) {
