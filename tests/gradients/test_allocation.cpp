@@ -170,6 +170,62 @@ TEST(SpreadSamples, KnowWhatFurtherOnesCost) {
   }
 }
 
+// A term that is left out adds 0: where samples have a mean and hardly vary, that costs more than
+// it saves. By brute force over the counts.
+TEST(SpreadSamples, KnowWhatIsLostWhereATermIsLeftOut) {
+  PlanGrid grid;
+  grid.columns = grid.rows = 10;
+  const auto cells = [&](double v) { return std::vector<double>(grid.size(), v); };
+  std::vector<double> fewest;
+  for (const double squared : {0.0, 0.01, 0.1, 1.0, 10.0}) {
+    const double variance = 0.01;
+    TermFigures edges{variance, 10, 0.125, cells(variance)};
+    edges.squared_mean = squared;
+    edges.cells_squared = cells(squared);
+    const std::vector<TermFigures> figures = {{1, 3, 1, cells(1)}, edges};
+    SamplePlan plan;
+    spread_samples(figures, grid, plan);
+    const auto product = [&](double a, double b) {
+      const double left = b < 1 ? (variance + squared) / b - squared : variance / b;
+      return (1 / a + left) * (3 * a + 10 * b);
+    };
+    double least = 1e9;
+    for (int a = 1; a <= 24; ++a) {
+      for (double b = 0.125; b < 1; b += 0.0625) least = std::min(least, product(a, b));
+      for (int b = 1; b <= 24; ++b) least = std::min(least, product(a, b));
+    }
+    EXPECT_LE(product(plan.counts[0][0], plan.counts[0][1]), 1.1 * least) << squared;
+    // The same of counts that all pixels share.
+    const SampleCounts counts = best_samples(figures);
+    EXPECT_LE(product(counts[0], counts[1]), 1.1 * least) << squared;
+    fewest.push_back(plan.counts[0][1]);
+  }
+  EXPECT_LT(fewest.front(), 0.75);
+  EXPECT_GE(fewest.back(), 1);
+}
+
+// Squared means are unbiased: those of all pairs of different samples.
+TEST(PilotMoments, HaveTheSquaredMean) {
+  Rng rng(4, 0, 0);
+  CellSums sums(1, 2);
+  std::vector<std::array<double, 3>> samples;
+  for (int i = 0; i < 5; ++i) {
+    TurnedSample sample;
+    for (int c = 0; c < 3; ++c) sample.value[c][1] = rng.uniform();
+    samples.push_back({sample.value[0][1], sample.value[1][1], sample.value[2][1]});
+    sums.add(0, sample);
+  }
+  double expected = 0;
+  for (int i = 0; i < 5; ++i) {
+    for (int j = 0; j < 5; ++j) {
+      for (int c = 0; c < 3 && i != j; ++c) expected += samples[i][c] * samples[j][c] / 20;
+    }
+  }
+  const CellCovariances covariances = sums.take(5);
+  EXPECT_NEAR(covariances[0].squared_mean(1), expected, 1e-5);
+  EXPECT_EQ(covariances[0].squared_mean(0), 0);
+}
+
 TEST(SpreadSamples, CostNoMoreThanTheyMay) {
   PlanGrid grid;
   grid.columns = grid.rows = 10;

@@ -152,7 +152,8 @@ TEST(ChangedTerms, OfValuesAloneAreAsBesideMotion) {
     const Moments& b = joint.parameters[0].terms[0];
     double largest = 0;
     for (size_t i = 0; i < b.size(); ++i) largest = std::max(largest, std::fabs(b.mean(i)));
-    EXPECT_TRUE(largest > 0 || name.starts_with("beam"));  // lights nothing in view
+    // The one lights nothing in view, the other reflects everything at eta 0.
+    EXPECT_TRUE(largest > 0 || name.starts_with("beam") || name == "gloss.k");
     // Rounding may part a path that grazes an edge from the same one.
     int apart = 0, of = 0;
     for (size_t i = 0; i < b.size(); ++i) {
