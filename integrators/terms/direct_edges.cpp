@@ -11,7 +11,7 @@ namespace {
 // four emitters on gloss, where the list is long: what is left is the error of p within its pixel.
 constexpr int kPoints = 4;
 // Emitters are small below this angle [rad], and have few sides up to this number. Not tuned.
-constexpr double kSmall = 1e9;
+constexpr double kSmall = 0.1;
 constexpr int kMostSides = 8;
 
 DirectPoint point_at(const DirectPieces::Piece& piece, double u, double times) {
@@ -19,9 +19,19 @@ DirectPoint point_at(const DirectPieces::Piece& piece, double u, double times) {
   return {piece.region, {piece.piece.edge, t, density, times * piece.density}};
 }
 
+// What the sides of an emitter add cancels but for its size: none of them is left out, and all are
+// met at the same places.
+void draw_sides(std::span<const DirectPieces::Piece> sides, double u, int samples, TermCost& cost,
+                std::vector<DirectPoint>& drawn) {
+  cost.samples += sides.size() * static_cast<uint64_t>(samples);
+  for (int i = 0; i < samples; ++i) {
+    for (const DirectPieces::Piece& side : sides) drawn.push_back(point_at(side, (i + u) / samples, 1));
+  }
+}
+
 }  // namespace
 
-void draw_pieces(const EdgeSamplerInput& edges, const std::vector<DirectPieces::Piece>& pieces,
+void draw_pieces(const EdgeSamplerInput& edges, std::span<const DirectPieces::Piece> pieces,
                  Rng rng, int points, int samples, TermCost& cost,
                  std::vector<DirectPoint>& drawn) {
   const int count = points * samples;
@@ -61,8 +71,7 @@ void DirectEdges::list(const EdgeQuery& emitters, const EdgeQuery& patches, doub
   static thread_local std::vector<ListedEdge> listed;
   static thread_local std::vector<EdgePiece> pieces;
   const auto append = [&](std::vector<DirectPieces::Piece>& list, uint32_t k,
-                          const EdgePiece& piece, double density) {
-    const double before = list.empty() ? 0 : list.back().sum;
+                          const EdgePiece& piece, double density, double before) {
     list.push_back({k, piece, before + piece.weight * regions_.luminance(k) / density, density});
   };
   to.clear();
@@ -77,21 +86,18 @@ void DirectEdges::list(const EdgeQuery& emitters, const EdgeQuery& patches, doub
     pieces.clear();
     sampler_.list_outlines(query, *cone, listed);
     cut_edges(edges_, query, *cone, listed, pieces);
-    const bool small = regions_.shape(k).valid() &&
-                       regions_.hull(k).radius < kSmall * length(regions_.hull(k).center - query.p);
     listed_here.pieces += pieces.size();
+    const auto is_own = [&](const EdgePiece& piece) {
+      return piece.edge.object == regions_.shape(k);
+    };
+    const bool small = regions_.hull(k).radius < kSmall * length(regions_.hull(k).center - query.p);
+    const bool apart = small || std::ranges::count_if(pieces, is_own) <= kMostSides;
     for (const EdgePiece& piece : pieces) {
-      const bool own = small && is_own_edge(k, piece.edge);
-      append(own ? to.outlines : to.others, k, piece, expected / times);
+      std::vector<DirectPieces::Piece>& list = apart && is_own(piece) ? to.outlines : to.others;
+      const bool first = list.empty() || (&list == &to.outlines && list.back().region != k);
+      append(list, k, piece, expected / times, first ? 0 : list.back().sum);
     }
   }
-}
-
-// Whether the edge is a side of the emitter itself.
-bool DirectEdges::is_own_edge(uint32_t region, EdgeRef edge) const {
-  const auto faces = edges_.object(edge.object).faces_around(edge.edge);
-  return std::any_of(faces.begin(), faces.end(),
-                     [&](FaceRef face) { return face.shape == regions_.shape(region); });
 }
 
 void DirectEdges::draw(const DirectPieces& pieces, const Rng& key, int bounces, int samples,
@@ -99,39 +105,16 @@ void DirectEdges::draw(const DirectPieces& pieces, const Rng& key, int bounces, 
   points.clear();
   draw_pieces(edges_, pieces.others, key.at(Purpose::kDirect, bounces), kPoints, samples, cost,
               points);
-  const auto& outlines = pieces.outlines;
+  const Rng rng = key.copy(Purpose::kDirectCopy, 1).at(Purpose::kDirect, bounces);
+  const std::span outlines(pieces.outlines);
   for (size_t begin = 0, end = 0; begin < outlines.size(); begin = end) {
     while (end < outlines.size() && outlines[end].region == outlines[begin].region) ++end;
-    for (int i = 0; i < samples; ++i) {
-      Rng rng = key.copy(Purpose::kDirectCopy, i + 1).at(Purpose::kDirect, bounces);
-      draw_outline(&outlines[begin], &outlines[begin] + (end - begin), rng.uniform(), cost, points);
+    const auto sides = outlines.subspan(begin, end - begin);
+    if (sides.size() > kMostSides) {
+      draw_pieces(edges_, sides, rng, kMostSides, samples, cost, points);
+    } else {
+      draw_sides(sides, Rng(rng).uniform(), samples, cost, points);
     }
-  }
-}
-
-// What the sides of a small emitter add cancels but for its size: none of them is left out, and all
-// are met at the same place. Of many, each is met as often as it weighs.
-void DirectEdges::draw_outline(const DirectPieces::Piece* begin, const DirectPieces::Piece* end,
-                               double u, TermCost& cost, std::vector<DirectPoint>& drawn) const {
-  if (end - begin <= kMostSides) {
-    cost.samples += static_cast<uint64_t>(end - begin);
-    for (const DirectPieces::Piece* piece = begin; piece != end; ++piece) {
-      drawn.push_back(point_at(*piece, u, 1));
-    }
-    return;
-  }
-  cost.samples += kMostSides;
-  const double first =
-      begin->sum - begin->piece.weight * regions_.luminance(begin->region) / begin->density;
-  const double total = (end - 1)->sum - first;
-  const DirectPieces::Piece* piece = begin;
-  for (int j = 0; j < kMostSides; ++j) {
-    const double target = first + (j + u) / kMostSides * total;
-    while (piece + 1 != end && piece->sum <= target) ++piece;
-    const double before = piece == begin ? first : (piece - 1)->sum;
-    const double weight = piece->sum - before;
-    const double place = std::clamp((target - before) / weight, 0.0, 1.0);
-    drawn.push_back(point_at(*piece, place, weight / total * kMostSides));
   }
 }
 

@@ -2,6 +2,7 @@
 // The silhouettes before regions of light, as one point sees them, and points drawn on these by
 // what each would add. See direct_boundary.cpp for the estimator.
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "integrators/lights/light_regions.h"
@@ -16,11 +17,11 @@ struct DirectPieces {
   struct Piece {
     uint32_t region;
     EdgePiece piece;
-    double sum;          // of the weights up to here
+    double sum;          // of the weights up to here; of outlines, of one emitter's
     double density = 1;  // how often it is listed on average, over how often it was
   };
   std::vector<Piece> others;
-  std::vector<Piece> outlines;  // sides of small emitters, one emitter after the other
+  std::vector<Piece> outlines;  // sides of small or simple emitters, one after the other
   void clear() { others.clear(), outlines.clear(); }
 };
 
@@ -33,8 +34,8 @@ struct DirectPoint {
 
 // Appends to `drawn` as many points, stratified over the weights; `points` for each of `samples`.
 // Books them.
-void draw_pieces(const EdgeSamplerInput& edges, const std::vector<DirectPieces::Piece>& pieces,
-                 Rng rng, int points, int samples, TermCost& cost, std::vector<DirectPoint>& drawn);
+void draw_pieces(const EdgeSamplerInput& edges, std::span<const DirectPieces::Piece> pieces, Rng rng,
+                  int points, int samples, TermCost& cost, std::vector<DirectPoint>& drawn);
 
 // What the calling thread has listed so far. Lists take time that samples and rays do not tell: a
 // pilot charges it by the difference.
@@ -62,11 +63,6 @@ class DirectEdges {
             std::vector<DirectPoint>& points) const;
 
  private:
-  bool is_own_edge(uint32_t region, EdgeRef edge) const;
-  // Pieces [begin, end), at the place u of each.
-  void draw_outline(const DirectPieces::Piece* begin, const DirectPieces::Piece* end, double u,
-                    TermCost& cost, std::vector<DirectPoint>& drawn) const;
-
   const EdgeSamplerInput& edges_;
   const EdgeSampler& sampler_;
   const LightRegions& regions_;
