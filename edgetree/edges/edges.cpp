@@ -55,15 +55,18 @@ class Builder {
       return std::pair(std::min(s.from, s.to), std::max(s.from, s.to));
     };
     result_.edges.reserve(sides_.size() / 2);  // of a closed mesh
-    result_.face_offsets.reserve(sides_.size() / 2 + 1);
-    result_.incident_faces.reserve(sides_.size());
-    result_.face_offsets.push_back(0);
+    std::vector<uint32_t> offsets{0};
+    bool many = false;  // faces are around some edge
     for (size_t begin = 0, end; begin < sides_.size(); begin = end) {
-      for (end = begin; end < sides_.size() && ends(sides_[end]) == ends(sides_[begin]); ++end)
-        result_.incident_faces.push_back({result_.shape, sides_[end].face});
-      result_.face_offsets.push_back(static_cast<uint32_t>(end));
+      for (end = begin; end < sides_.size() && ends(sides_[end]) == ends(sides_[begin]);) ++end;
+      many = many || end - begin > 2;
+      offsets.push_back(static_cast<uint32_t>(end));
       append_edge({&sides_[begin], end - begin});
     }
+    if (!many) return;
+    result_.face_offsets = std::move(offsets);
+    for (const HalfEdge& side : sides_)
+      result_.incident_faces.push_back({result_.shape, side.face});
   }
 
   // Sorts by the smaller end (counting sort, faster than comparisons), the larger end, the

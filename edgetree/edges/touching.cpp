@@ -518,6 +518,7 @@ class Unifier {
   void rewrite(uint32_t object, std::span<const Part> parts, std::span<const NearFace> near) {
     EdgeMesh& mesh = objects_[object];
     EdgeMesh old;
+    old.shape = mesh.shape;
     old.edges = std::exchange(mesh.edges, {});
     old.face_offsets = std::exchange(mesh.face_offsets, {0});
     old.incident_faces = std::exchange(mesh.incident_faces, {});
@@ -549,7 +550,7 @@ class Unifier {
     std::inplace_merge(sources.begin(), middle, sources.end(), before);
     mesh.edges.reserve(sources.size());
     mesh.face_offsets.reserve(sources.size() + 1);
-    mesh.incident_faces.reserve(old.incident_faces.size());
+    mesh.incident_faces.reserve(2 * sources.size());
     mesh.near_offsets.reserve(sources.size() + 1);
     mesh.near_offsets.assign(1, 0);
     for (const Source& source : sources) {
@@ -557,8 +558,7 @@ class Unifier {
       const EdgeId whole = source.part
                                ? source.part->whole
                                : EdgeId(static_cast<uint32_t>(source.edge - old.edges.data()));
-      const auto faces =
-          source.part ? std::span<const FaceRef>(source.part->faces) : old.faces_around(whole);
+      const FaceList faces = source.part ? FaceList(source.part->faces) : old.faces_around(whole);
       append_near(near, whole, faces, mesh);
       mesh.incident_faces.insert(mesh.incident_faces.end(), faces.begin(), faces.end());
       mesh.incidences.resize(mesh.incident_faces.size());

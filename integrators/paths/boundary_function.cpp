@@ -39,10 +39,12 @@ void accumulate(std::vector<uint32_t>& offsets) {
   }
 }
 
-// Of the runs [offsets[e], offsets[e + 1]) of values, those of the edges that are kept.
+// Of the runs [offsets[e], offsets[e + 1]) of values, if there are any, those of the edges that are
+// kept.
 template <class T>
-void keep_runs(const std::vector<size_t>& kept, std::vector<uint32_t> offsets,
+void keep_runs(const std::vector<size_t>& kept, const std::vector<uint32_t>& offsets,
                std::vector<T>& values) {
+  if (values.empty()) return;
   std::vector<T> all;
   for (const size_t e : kept) {
     all.insert(all.end(), values.begin() + offsets[e], values.begin() + offsets[e + 1]);
@@ -50,6 +52,7 @@ void keep_runs(const std::vector<size_t>& kept, std::vector<uint32_t> offsets,
   values = std::move(all);
 }
 void keep_offsets(const std::vector<size_t>& kept, std::vector<uint32_t>& offsets) {
+  if (offsets.empty()) return;
   std::vector<uint32_t> all{0};
   for (const size_t e : kept) all.push_back(all.back() + offsets[e + 1] - offsets[e]);
   offsets = std::move(all);
@@ -67,9 +70,8 @@ void leave_out_followed(EdgeMesh& mesh) {
   }
   mesh.edges = std::move(edges);
   keep_runs(kept, mesh.face_offsets, mesh.incident_faces);
-  if (!mesh.incidences.empty()) keep_runs(kept, mesh.face_offsets, mesh.incidences);
+  keep_runs(kept, mesh.face_offsets, mesh.incidences);
   keep_offsets(kept, mesh.face_offsets);
-  if (mesh.near_offsets.empty()) return;
   keep_runs(kept, mesh.near_offsets, mesh.faces_and_near);
   keep_offsets(kept, mesh.near_offsets);
 }

@@ -264,7 +264,8 @@ bool edge_difference(const PathContext& context, const EdgeMesh& mesh, const Edg
   if (difference_in_sight(context, mesh, view, ray, viewer, rays, difference)) return true;
   // What regions emit is seen directly alone, and is no part of what comes straight through.
   if (!context.straight_ways || viewer.part.region) return false;
-  ray.skip_faces = mesh.around(view.id.edge).all;
+  const FacesAround around = mesh.around(view.id.edge);
+  ray.skip_faces = around.all;
   StraightWay way{view.p, viewer.start, viewer.bounces};
   EdgeView beyond = view;
   Hit hit;
@@ -272,7 +273,7 @@ bool edge_difference(const PathContext& context, const EdgeMesh& mesh, const Edg
     if (!way.pass(context, hit.face, beyond.omega) || !view_from(way.from, beyond)) return false;
     ray = {beyond.p, beyond.omega};
     ray.start = way.start;
-    ray.skip_faces = mesh.around(view.id.edge).all;
+    ray.skip_faces = around.all;
     const EdgeViewer straight{way.start, way.bounces, viewer.key};
     if (difference_in_sight(context, mesh, beyond, ray, straight, rays, difference)) {
       difference = difference * way.share;

@@ -105,9 +105,9 @@ class FilmEdges {
   // Where no motion is known: whether an edge that moves with these faces may move as it is seen.
   bool may_move(const FilmView& view, std::span<const FaceRef> faces) const;
   // The faces whose vertices an edge hangs on: of its own mesh, or, where two faces cross, both.
-  static std::span<const FaceRef> faces_that_move(const EdgeMesh& mesh, EdgeId edge) {
-    const auto faces = mesh.faces_around(edge);
-    return mesh.shape.valid() ? faces.first(1) : faces;
+  static FaceList faces_that_move(const EdgeMesh& mesh, EdgeId edge) {
+    const FaceList faces = mesh.faces_around(edge);
+    return mesh.shape.valid() ? FaceList(faces[0]) : faces;
   }
   // The fraction of a segment in space that is seen at the fraction s of its projection.
   double fraction_in_space(double s, double depth0, double depth1) const {

@@ -17,14 +17,18 @@ std::pair<VertexId, VertexId> ends_of(const Edge& edge) {
 const char* fault_of_sizes(const EdgeMesh& mesh) {
   if (!mesh.tangents.empty() && mesh.tangents.size() != mesh.positions.size())
     return "there are other than V tangents";
-  if (mesh.face_offsets.size() != mesh.edges.size() + 1)
-    return "there are other than E + 1 offsets";
+  const size_t offsets = mesh.face_offsets.size();
+  if (offsets > 0 && offsets != mesh.edges.size() + 1) return "there are other than E + 1 offsets";
   if (!mesh.incidences.empty() && mesh.incidences.size() != mesh.incident_faces.size())
     return "there are other incidences than incident faces";
-  if (mesh.face_offsets.front() != 0 || mesh.face_offsets.back() != mesh.incident_faces.size())
+  if (mesh.incident_faces.size() != (offsets == 0 ? 0 : mesh.face_offsets.back()))
     return "offsets do not span the incident faces";
-  for (size_t e = 0; e < mesh.edges.size(); ++e)
+  for (size_t e = 0; e + 1 < offsets; ++e)
     if (mesh.face_offsets[e] >= mesh.face_offsets[e + 1]) return "an edge has no faces";
+  for (const Edge& edge : mesh.edges)
+    for (const FaceId face : edge.faces)
+      if (face.valid() && face.index() >= mesh.planes.size())
+        return "an edge's face is out of range";
   if (!mesh.near_offsets.empty() && (mesh.near_offsets.size() != mesh.edges.size() + 1 ||
                                      mesh.near_offsets.back() != mesh.faces_and_near.size()))
     return "offsets do not span the near faces";
@@ -49,7 +53,7 @@ double welding_error(const EdgeMesh& mesh) { return touch_tolerance(mesh.extent,
 
 const char* fault_of_faces(const EdgeMesh& mesh, EdgeId id) {
   const Edge& edge = mesh.edge(id);
-  const std::span<const FaceRef> around = mesh.faces_around(id);
+  const FaceList around = mesh.faces_around(id);
   if (around[0] != FaceRef{mesh.shape, edge.faces[0]})
     return "its first face is not the first around it";
   const bool has_second = around.size() > 1 && around[1].shape == mesh.shape;
@@ -80,7 +84,6 @@ const char* fault_of_crossing(const EdgeMesh& mesh, EdgeId id) {
     if (!contact &&
         around.incidence(i) != Incidence{.through = true, .motion_group = kNoMotionGroup})
       return "a face that crosses ends there";
-    if (mesh.edge(id).faces[i].index() >= mesh.planes.size()) return "a plane is out of range";
   }
   return nullptr;
 }

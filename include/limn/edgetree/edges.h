@@ -42,13 +42,32 @@ struct Incidence {
   bool operator==(const Incidence&) const = default;
 };
 
+// At most two faces, or those of an array, which must outlive this.
+class FaceList {
+ public:
+  FaceList() = default;
+  FaceList(std::span<const FaceRef> faces) : array_(faces.data()), size_(faces.size()) {}
+  // The first one or two: `second` may be none.
+  FaceList(FaceRef first, FaceRef second = {})
+      : size_(second.face.valid() ? 2 : 1), own_{first, second} {}
+  const FaceRef* begin() const { return array_ ? array_ : own_.data(); }
+  const FaceRef* end() const { return begin() + size_; }
+  size_t size() const { return size_; }
+  const FaceRef& operator[](size_t i) const { return begin()[i]; }
+
+ private:
+  const FaceRef* array_ = nullptr;
+  size_t size_ = 0;
+  std::array<FaceRef, 2> own_;
+};
+
 // All faces that touch an edge along its whole length, and near faces: float rays cannot resolve on
 // which side of the edge they are (touching.h).
 struct FacesAround {
-  std::span<const FaceRef> faces;
-  std::span<const Incidence> incidences;  // of each face; empty if all are defaults
-  std::span<const FaceRef> near = {};     // disjoint from `faces`
-  std::span<const FaceRef> all = faces;   // the faces, then the near faces
+  FaceList faces;
+  std::span<const Incidence> incidences = {};  // of each face; empty if all are defaults
+  std::span<const FaceRef> near = {};          // disjoint from `faces`
+  FaceList all = faces;                        // the faces, then the near faces
   Incidence incidence(size_t i) const { return incidences.empty() ? Incidence{} : incidences[i]; }
 };
 
@@ -78,7 +97,7 @@ struct EdgeMesh {
   // face, by the barycentric coordinates of its second and third corner. Else empty.
   std::vector<std::array<double, 2>> places;
   // Faces around edge e, of any shape: incident_faces[face_offsets[e], face_offsets[e + 1]). Those
-  // of `shape` come first.
+  // of `shape` come first. Both arrays are empty if these are Edge::faces alone for every edge.
   std::vector<uint32_t> face_offsets;  // E + 1
   std::vector<FaceRef> incident_faces;
   std::vector<Incidence> incidences;  // of incident_faces; empty if all are defaults
@@ -102,18 +121,23 @@ struct EdgeMesh {
   const Plane& plane(FaceId id) const { return planes[id.index()]; }
   const Vec3d& position(VertexId id) const { return positions[id.index()]; }
   Vec3<Lanes> tangent(VertexId id) const { return tangents[id.index()]; }
-  std::span<const FaceRef> faces_around(EdgeId id) const {
+  FaceList faces_around(EdgeId id) const {
+    if (face_offsets.empty()) {
+      const auto [first, second] = edge(id).faces;
+      return {{shape, first}, {shape, second}};
+    }
     const uint32_t *begin = &face_offsets[id.index()], *end = begin + 1;
-    return {incident_faces.data() + *begin, *end - *begin};
+    return std::span(incident_faces.data() + *begin, *end - *begin);
   }
   FacesAround around(EdgeId id) const {
-    FacesAround around{faces_around(id), {}};
+    FacesAround around{faces_around(id)};
     const size_t count = around.faces.size();
     if (!incidences.empty()) around.incidences = {&incidences[face_offsets[id.index()]], count};
     if (!near_offsets.empty() && near_offsets[id.index() + 1] > near_offsets[id.index()]) {
       const uint32_t *begin = &near_offsets[id.index()], *end = begin + 1;
-      around.all = {faces_and_near.data() + *begin, *end - *begin};
-      around.near = around.all.subspan(count);
+      const std::span all(faces_and_near.data() + *begin, *end - *begin);
+      around.all = all;
+      around.near = all.subspan(count);
     }
     return around;
   }
@@ -121,14 +145,14 @@ struct EdgeMesh {
   // there, its ends and faces.
   void fetch_edge(EdgeId id) const {
     prefetch(&edges[id.index()]);
-    prefetch(&face_offsets[id.index()]);
+    if (!face_offsets.empty()) prefetch(&face_offsets[id.index()]);
   }
   void fetch_ends(EdgeId id) const {
     for (const VertexId vertex : edge(id).vertices) {
       prefetch(&positions[vertex.index()]);
       if (!tangents.empty()) tangents.fetch(vertex.index());
     }
-    prefetch(incident_faces.data() + face_offsets[id.index()]);
+    if (!face_offsets.empty()) prefetch(incident_faces.data() + face_offsets[id.index()]);
   }
   uint64_t count(EdgeClass edge_class) const;
 };
