@@ -26,6 +26,11 @@ using Eigen::Vector4d;
 // Weight of flat edges, for points on their plane. Not tuned.
 constexpr double kFlat = 0x1.0p-12;
 
+struct Scratch {
+  std::vector<Vector4d> planes;
+  std::vector<Vector3d> points;
+};
+
 // Principal axes of points, the widest first.
 Eigen::Matrix3d principal_axes(const std::vector<Vector3d>& points) {
   Vector3d mean = Vector3d::Zero();
@@ -85,8 +90,10 @@ DualFit unrejectable_fit(double cover) {
 
 DualFit fit_dual(std::span<const Wedge> wedges, const NodeFrame& frame,
                  const ForestConfig& config) {
-  static thread_local std::vector<Vector4d> planes;
-  static thread_local std::vector<Vector3d> points;
+  constexpr size_t kMany = 4096;  // wedges, whose memory is not kept; not tuned
+  static thread_local Scratch kept;
+  Scratch own;
+  auto& [planes, points] = wedges.size() > kMany ? own : kept;
   planes.clear();
   planes.reserve(2 * wedges.size());
   for (const Wedge& wedge : wedges)

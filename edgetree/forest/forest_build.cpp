@@ -94,11 +94,11 @@ class TreeFiller {
     const NodeFrame frame =
         frame_of(small ? bounds_of(edges(split.range)) : list_.bounds(split.range));
     if (ids_[index] < 0) {
-      EdgeNode& node = forest.edges[~ids_[index]];
+      EdgeNode& node = *std::construct_at(&forest.edges[~ids_[index]]);
       fill_head(frame, node.head);
       fill_edges(split, frame, node);
     } else {
-      InnerNode& node = forest.inner[ids_[index]];
+      InnerNode& node = *std::construct_at(&forest.inner[ids_[index]]);
       fill_head(frame, node.head);
       fill_children(split, frame, node);
     }
@@ -120,14 +120,13 @@ class TreeFiller {
     head.fold = kind_.fold;
   }
 
-  DualFit fit(std::span<const Wedge> wedges, const NodeFrame& frame) const {
+  DualFit fit(std::span<const Wedge> wedges, const NodeFrame& frame) {
     if (kind_.group == ForestGroup::kAlways) return unrejectable_fit(length_of(wedges));
     if (kind_.group == ForestGroup::kSilhouette) return fit_dual(wedges, frame, config_);
     // A fold counts `folds` of the node; a silhouette counts this much more.
-    static thread_local std::vector<Wedge> rest;
-    rest.assign(wedges.begin(), wedges.end());
-    for (Wedge& wedge : rest) wedge.length *= 1 - wedge.fold;
-    return fit_dual(rest, frame, config_);
+    rest_.assign(wedges.begin(), wedges.end());
+    for (Wedge& wedge : rest_) wedge.length *= 1 - wedge.fold;
+    return fit_dual(rest_, frame, config_);
   }
 
   void fill_children(const SplitNode<kWidth>& split, const NodeFrame& frame, InnerNode& node) {
@@ -170,6 +169,7 @@ class TreeFiller {
   std::span<const NodeId> below_;
   TreeKind kind_;
   const ForestConfig& config_;
+  std::vector<Wedge> rest_;
 };
 
 // Allocates the nodes of a tree of edges, or above other trees; returns their ids.

@@ -2,6 +2,7 @@
 // Data of the edge forest: nodes of up to eight children in SIMD vectors. Children of inner nodes
 // are nodes, children of edge nodes are edges.
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "edgetree/forest/forest_motion.h"
@@ -87,9 +88,15 @@ struct alignas(64) EdgeNode {
   }
 };
 
+// For vectors whose elements are constructed when they are filled: until then they take no memory.
+template <class T>
+struct LateAllocator : std::allocator<T> {
+  void construct(T*) {}
+};
+
 struct Forest {
-  std::vector<InnerNode> inner;
-  std::vector<EdgeNode> edges;
+  std::vector<InnerNode, LateAllocator<InnerNode>> inner;
+  std::vector<EdgeNode, LateAllocator<EdgeNode>> edges;
   // Of the trees of objects and groups, or of nodes above many of them.
   std::vector<NodeId> roots;
   std::vector<NodeId> moving_roots;   // of them, those with edges that move by themselves
