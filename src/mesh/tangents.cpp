@@ -2,6 +2,7 @@
 #include "limn/core/tangents.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace limn {
 namespace {
@@ -29,7 +30,8 @@ void Tangents::widen(const Vec3<Lanes>& v) {
   if (needed == lanes_) return;
   const size_t count = data_.size() / stride();
   std::vector<double> wide(3 * static_cast<size_t>(needed) * count);
-  for (size_t i = 0; i < 3 * count; ++i) std::copy_n(&data_[i * lanes_], lanes_, &wide[i * needed]);
+  const double* from = std::as_const(data_).data();
+  for (size_t i = 0; i < 3 * count; ++i) std::copy_n(from + i * lanes_, lanes_, &wide[i * needed]);
   data_ = std::move(wide);
   lanes_ = needed;
 }
@@ -37,10 +39,10 @@ void Tangents::widen(const Vec3<Lanes>& v) {
 void Tangents::expand() {
   if (!one_) return;
   one_ = false;
-  const std::vector<double> first = std::move(data_);
-  data_.clear();
+  const SharedVector<double> first = std::move(data_);
   data_.reserve(stride() * std::max(size_ + 1, expected_));
-  for (size_t i = 0; i < size_; ++i) data_.insert(data_.end(), first.begin(), first.end());
+  for (size_t i = 0; i < size_; ++i)
+    for (const double x : first) data_.push_back(x);
 }
 
 void Tangents::assign(size_t n, const Vec3<Lanes>& v) {

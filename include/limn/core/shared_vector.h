@@ -38,6 +38,7 @@ class SharedVector {
   explicit operator std::vector<T>() const { return {begin(), end()}; }
   bool empty() const { return size_ == 0; }
   size_t size() const { return size_; }
+  size_t capacity() const { return items_ ? items_->capacity() : 0; }
   const T* data() const { return data_; }
   const T* begin() const { return data_; }
   const T* end() const { return data_ + size_; }

@@ -1,11 +1,12 @@
 #pragma once
 // Derivatives of the vectors of a mesh in all lanes, in as little memory as they need: one for all
-// where all are alike (a translation), and no lanes behind the last that is not zero.
+// where all are alike (a translation), and no lanes behind the last that is not zero. Copies share
+// it until one of them is changed.
 #include <cstddef>
-#include <vector>
 
 #include "limn/core/dual.h"
 #include "limn/core/prefetch.h"
+#include "limn/core/shared_vector.h"
 #include "limn/core/vec.h"
 
 namespace limn {
@@ -68,7 +69,7 @@ class Tangents {
   size_t size_ = 0, expected_ = 0;
   int lanes_ = 1;    // 1 to kLanes
   bool one_ = true;  // data_ holds the first, for all
-  std::vector<double> data_;
+  SharedVector<double> data_;
 };
 
 }  // namespace limn
