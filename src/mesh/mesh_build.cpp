@@ -17,7 +17,7 @@ void warn(std::vector<std::string>* warnings, const SourceLocation& where,
 }
 
 void set_positions(Mesh& mesh, const RawMesh& raw, const Matrix4& to_world) {
-  mesh.positions.reserve(raw.positions.size());
+  mesh.positions.reserve(raw.positions.size() + 1);  // Embree reads beyond the last, too
   for (size_t i = 0; i < raw.positions.size(); ++i) {
     const Vec3d p = to_world.point(raw.positions[i]);
     for (int k = 0; k < 3; ++k) {

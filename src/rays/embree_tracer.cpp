@@ -583,7 +583,11 @@ class EmbreeTracer final : public RayTracer {
   // axis-aligned boxes of all faces of a cylinder.
   Owned<RTCGeometry> make_shape(ShapeId id, int threads) {
     const auto frame = frame_of(scene_.shape(id).mesh);
-    if (!frame) return make_triangles(id, [&](const Vec3d& x) { return x - origin_; });
+    if (!frame) {
+      auto shared = share_triangles(id);
+      return shared ? std::move(shared)
+                    : make_triangles(id, [&](const Vec3d& x) { return x - origin_; });
+    }
     const auto& [center, axes, half] = *frame;
     const Owned<RTCScene> own = make_scene(quality());
     const Owned<RTCGeometry> triangles = make_triangles(id, [&](const Vec3d& x) {
@@ -594,6 +598,25 @@ class EmbreeTracer final : public RayTracer {
     commit(own.get(), threads);
     return make_instance(own.get(), {cast<float>(axes[0]), cast<float>(axes[1]),
                                      cast<float>(axes[2]), cast<float>(center - origin_)});
+  }
+  // Embree reads the mesh's own arrays, if it takes all of them as they are: null if not, or if the
+  // geometry outlives this tracer. As it reads 16 bytes of the last vertex, there must be room.
+  Owned<RTCGeometry> share_triangles(ShapeId id) {
+    const Mesh& mesh = scene_.shape(id).mesh;
+    const bool kept = scene_.exposure && scene_.exposure->kept_shapes;
+    if (kept || origin_ != Vec3d{} || mesh.positions.capacity() == mesh.positions.size()) return {};
+    for (uint32_t i = 0; i < mesh.faces.size(); ++i)
+      if (!is_traced(mesh, {id, FaceId(i)})) return {};
+    Owned<RTCGeometry> geometry(rtcNewGeometry(device_->get(), RTC_GEOMETRY_TYPE_TRIANGLE));
+    device_->check();
+    rtcSetSharedGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                               mesh.positions.data(), 0, sizeof(Vec3f), mesh.positions.size());
+    rtcSetSharedGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                               mesh.faces.data(), 0, sizeof(FaceIndices), mesh.faces.size());
+    device_->check();
+    shared_.emplace_back(mesh.positions, mesh.faces);
+    rtcCommitGeometry(geometry.get());
+    return geometry;
   }
   template <class Place>
   Owned<RTCGeometry> make_triangles(ShapeId id, const Place& place) {
@@ -680,6 +703,8 @@ class EmbreeTracer final : public RayTracer {
   Vec3d origin_;  // origin of Embree's coordinates
   double reach_;
   std::shared_ptr<EmbreeDevice> device_;
+  // The arrays that Embree reads, kept alive should the scene change.
+  std::vector<std::pair<SharedVector<Vec3f>, SharedVector<FaceIndices>>> shared_;
   Owned<RTCScene> rtc_scene_;
 };
 

@@ -46,6 +46,24 @@ double margin(const Scene& scene, const Ray& ray, FaceRef face) {
   return std::min({b1, b2, 1 - b1 - b2});
 }
 
+// Embree reads arrays with room behind the last vertex where they are, and copies of others.
+TEST(EmbreeArrays, MeetTheSameWithAndWithoutRoom) {
+  Scene tight = some_scene(1), roomy = tight;
+  for (Shape& shape : tight.shapes) shape.mesh.positions = std::vector<Vec3f>(shape.mesh.positions);
+  for (Shape& shape : roomy.shapes) shape.mesh.positions.reserve(shape.mesh.positions.size() + 1);
+  ASSERT_EQ(tight.shapes[0].mesh.positions.capacity(), tight.shapes[0].mesh.positions.size());
+  const auto of_copies = make_embree_tracer(tight, 1), in_place = make_embree_tracer(roomy, 1);
+  Rng rng(7, 8, 9);
+  for (int i = 0; i < 1000; ++i) {
+    const Vec3d from = random_direction(rng) * 2.0;
+    const Ray ray{from, random_direction(rng)};
+    Hit a, b;
+    ASSERT_EQ(of_copies->closest(ray, a), in_place->closest(ray, b));
+    EXPECT_EQ(a.face, b.face);
+    EXPECT_EQ(a.t, b.t);
+  }
+}
+
 class RayTracers : public testing::TestWithParam<double> {};
 
 TEST_P(RayTracers, AgreeButForRounding) {
