@@ -13,13 +13,6 @@
 namespace limn {
 namespace {
 
-template <class S>
-std::vector<FaceShape<S>> face_shapes(const Mesh& mesh) {
-  std::vector<FaceShape<S>> shapes(mesh.faces.size());
-  for (uint32_t f = 0; f < shapes.size(); ++f) shapes[f] = face_shape<S>(mesh, FaceId(f));
-  return shapes;
-}
-
 // Normal indices of a mesh with computed normals: one per welded vertex in use.
 void assign_normal_ids(Mesh& mesh) {
   std::vector<uint32_t> slot(mesh.positions.size(), kUnused);
@@ -41,19 +34,19 @@ void assign_normal_ids(Mesh& mesh) {
 // vertex with degenerate faces only gets +Z, which is never used. cancelled: number of such
 // vertices.
 template <class S>
-std::vector<Vec3<S>> computed_normals(const Mesh& mesh, const std::vector<FaceShape<S>>& shapes,
-                                      size_t& cancelled) {
+std::vector<Vec3<S>> computed_normals(const Mesh& mesh, size_t& cancelled) {
   std::vector<Vec3<S>> normals(mesh.normals.size());
   std::vector<uint32_t> any_face(mesh.normals.size(), kUnused);
   std::vector<double> angles(mesh.normals.size()), noise(mesh.normals.size());
   for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
-    if (!shapes[f].has_area) continue;
+    const FaceShape<S> shape = face_shape<S>(mesh, FaceId(f));
+    if (!shape.has_area) continue;
     for (int c = 0; c < 3; ++c) {
       const uint32_t n = mesh.normal_ids[f][c];
-      normals[n] += shapes[f].normal * shapes[f].angles[c];
+      normals[n] += shape.normal * shape.angles[c];
       any_face[n] = f;
-      angles[n] += value(shapes[f].angles[c]);
-      noise[n] += value(shapes[f].angles[c]) * shapes[f].rounding;
+      angles[n] += value(shape.angles[c]);
+      noise[n] += value(shape.angles[c]) * shape.rounding;
     }
   }
   for (size_t n = 0; n < normals.size(); ++n) {
@@ -63,7 +56,7 @@ std::vector<Vec3<S>> computed_normals(const Mesh& mesh, const std::vector<FaceSh
     } else if (value(length(normals[n])) > rest) {
       normals[n] = normalize(normals[n]);
     } else {
-      normals[n] = shapes[any_face[n]].normal;
+      normals[n] = face_shape<S>(mesh, FaceId(any_face[n])).normal;
       ++cancelled;
     }
   }
@@ -105,7 +98,7 @@ size_t fill_shading_normals(Mesh& mesh) {
   if (mesh.normal_source != NormalSource::kComputed) return 0;
   assign_normal_ids(mesh);
   size_t cancelled = 0;
-  mesh.normals = computed_normals(mesh, face_shapes<double>(mesh), cancelled);
+  mesh.normals = computed_normals<double>(mesh, cancelled);
   update_shading_tangents(mesh);
   return cancelled;
 }
@@ -117,7 +110,7 @@ void update_shading_tangents(Mesh& mesh) {
   if (mesh.position_tangents.all_alike()) return;  // then all derivatives of normals are zero
   mesh.normal_tangents.reserve(mesh.normals.size());
   size_t cancelled = 0;
-  for (const Vec3<Dual>& n : computed_normals(mesh, face_shapes<Dual>(mesh), cancelled)) {
+  for (const Vec3<Dual>& n : computed_normals<Dual>(mesh, cancelled)) {
     mesh.normal_tangents.push_back({n.x.d, n.y.d, n.z.d});
   }
 }
