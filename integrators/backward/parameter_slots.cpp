@@ -174,15 +174,10 @@ ParameterSlots::Dependence ParameterSlots::dependence_of(const Scene& scene,
     }
   }
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
-    std::vector<Vec3d> velocity = parameter.velocities(scene, ShapeId(s));
-    if (velocity.empty()) continue;
-    if (time_ && parameter.size == 1) velocity = velocities_now(scene, parameter, s);
+    if (parameter.velocities(scene, ShapeId(s)).empty()) continue;
+    if (time_ && parameter.size == 1) dependence.velocity = velocities_now(scene, parameter, s);
     dependence.shape = ShapeId(s);
     dependence.directions = parameter.directions(scene);
-    for (uint32_t v = 0; v < velocity.size() && parameter.size == 1; ++v) {
-      const Vec3d& u = velocity[v];
-      if (u.x != 0 || u.y != 0 || u.z != 0) dependence.velocity.emplace_back(v, u);
-    }
     if (scene.shapes[s].mesh.normal_source != NormalSource::kGiven || parameter.size > 1) break;
     Scene copy = deep_copy(scene);
     parameter.seed(copy, 0);
@@ -372,9 +367,13 @@ void ParameterSlots::gather_shape(ShapeId shape, const std::vector<double>& sums
       }
       continue;
     }
-    // Copies move together: the first one stands for all.
+    // Copies move together: the first one stands for all. Velocities are made anew: kept for all
+    // parameters of large meshes, they would be a quarter of the memory.
+    const std::vector<Vec3d> velocity =
+        time_ ? dependence.velocity : parameters_[i].velocities(scene_, shape);
     double sum = 0;
-    for (const auto& [v, velocity] : dependence.velocity) sum += dot(positions[v], velocity);
+    for (size_t v = 0; v < velocity.size(); ++v)
+      if (velocity[v] != Vec3d{}) sum += dot(positions[v], velocity[v]);
     for (size_t n = 0; n < dependence.normal_velocity.size(); ++n) {
       sum += dot(normals[n], dependence.normal_velocity[n]);
     }

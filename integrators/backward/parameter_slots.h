@@ -53,9 +53,8 @@ class ParameterSlots {
   };
   // What a parameter moves.
   struct Dependence {
-    ShapeId shape;  // none: values alone
-    // Of a scalar: of the vertices that it moves.
-    std::vector<std::pair<uint32_t, Vec3d>> velocity;
+    ShapeId shape;                       // none: values alone
+    std::vector<Vec3d> velocity;         // V, by a scalar at the time; empty without times
     std::vector<Vec3d> normal_velocity;  // N, of normals of the file; empty if they stay
     std::vector<Vec3d> directions;       // V, of displacements
     std::vector<Weight> weights;

@@ -89,6 +89,7 @@ struct ShadingNormalsAdjoint::OfMesh {
 };
 
 ShadingNormalsAdjoint::OfMesh::OfMesh(const Mesh& of) : mesh(of), around(of) {
+  shapes.reserve(mesh.faces.size());
   for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
     shapes.push_back(face_shape<double>(mesh, FaceId(f)));
   }
