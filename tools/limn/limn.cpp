@@ -64,7 +64,7 @@ void check_options(const CLI::App& command) {
   }
 }
 
-// Has glibc ask for pages of 2 MB wherever it takes memory, and keep arrays of up to 32 MB that are
+// Has glibc ask for pages of 2 MB wherever it takes memory, and keep arrays of up to 16 MB that are
 // given back for the next ones. It settles that before main: the program starts anew, with the wish
 // in its environment. Small arrays profit as well as large ones, and set-up meets a twentieth of
 // the page faults (scenes/FIGURES.md). Who has other wishes in GLIBC_TUNABLES keeps them; under a
@@ -74,7 +74,7 @@ void use_huge_pages([[maybe_unused]] char** argv) {
 #if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
   constexpr const char* kName = "GLIBC_TUNABLES";
   constexpr const char* kWish =
-      "glibc.malloc.hugetlb=1:glibc.malloc.mmap_threshold=33554432:"
+      "glibc.malloc.hugetlb=1:glibc.malloc.mmap_threshold=16777216:"
       "glibc.malloc.trim_threshold=67108864";
   const char* wish = std::getenv(kName);
   if (wish) {
