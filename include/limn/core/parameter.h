@@ -117,9 +117,9 @@ struct Parameter {
 // colours are not listed.
 std::vector<Parameter> list_parameters(const Scene& scene);
 
-// Finds a scalar parameter. A name may end in ".value", as in Mitsuba. UnknownParameter lists the
-// nearest known names if none is called `name`. InputError for an array (the message says how to
-// name a component), and if FILE cannot be read or does not fit the mesh.
+// Finds a scalar parameter. A name may be Mitsuba's, with ".value", ".brdf_0" or ".nested_bsdf".
+// UnknownParameter lists the nearest known names if there is none of this name. InputError for an
+// array (the message says how to name a component), and if FILE does not fit the mesh.
 Parameter find_parameter(const Scene& scene, const std::string& name);
 
 // Like find_parameter, but accepts arrays, too.
