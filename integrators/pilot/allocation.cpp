@@ -123,9 +123,7 @@ double best_on_film(const TermFigures& term, const Totals& others, double most) 
   if (!(term.variance > 0)) return term.least;
   constexpr double kStep = 1.189207115002721;  // the fourth root of 2
   const auto cost = [&](double n) { return others.cost + term.cost_of(n); };
-  const auto product = [&](double n) {
-    return (others.error + term.left_by(n)) * cost(n);
-  };
+  const auto product = [&](double n) { return (others.error + term.left_by(n)) * cost(n); };
   double least = std::numeric_limits<double>::infinity();
   for (double n = term.least; n <= kMostInPixel; n *= kStep) least = std::min(least, product(n));
   double n = term.least;

@@ -29,9 +29,7 @@ class Covariances {
   // Of the mean, unbiased: it may be negative.
   float squared_mean(int parameter) const { return own(parameter)[1 + kUnknowns]; }
 
-  static size_t size(int parameters) {
-    return kShared + static_cast<size_t>(parameters) * kOwn;
-  }
+  static size_t size(int parameters) { return kShared + static_cast<size_t>(parameters) * kOwn; }
 
  private:
   static constexpr size_t kShared = kUnknowns * (kUnknowns + 1) / 2, kOwn = kUnknowns + 2;

@@ -25,7 +25,8 @@ void draw_sides(std::span<const DirectPieces::Piece> sides, double u, int sample
                 std::vector<DirectPoint>& drawn) {
   cost.samples += sides.size() * static_cast<uint64_t>(samples);
   for (int i = 0; i < samples; ++i) {
-    for (const DirectPieces::Piece& side : sides) drawn.push_back(point_at(side, (i + u) / samples, 1));
+    for (const DirectPieces::Piece& side : sides)
+      drawn.push_back(point_at(side, (i + u) / samples, 1));
   }
 }
 
@@ -70,10 +71,6 @@ void DirectEdges::list(const EdgeQuery& emitters, const EdgeQuery& patches, doub
   static thread_local std::vector<LightRegions::Choice> choices;
   static thread_local std::vector<ListedEdge> listed;
   static thread_local std::vector<EdgePiece> pieces;
-  const auto append = [&](std::vector<DirectPieces::Piece>& list, uint32_t k,
-                          const EdgePiece& piece, double density, double before) {
-    list.push_back({k, piece, before + piece.weight * regions_.luminance(k) / density, density});
-  };
   to.clear();
   ++listed_here.lists;
   regions_.choose(emitters.p, u, choices);
@@ -95,7 +92,9 @@ void DirectEdges::list(const EdgeQuery& emitters, const EdgeQuery& patches, doub
     for (const EdgePiece& piece : pieces) {
       std::vector<DirectPieces::Piece>& list = apart && is_own(piece) ? to.outlines : to.others;
       const bool first = list.empty() || (&list == &to.outlines && list.back().region != k);
-      append(list, k, piece, expected / times, first ? 0 : list.back().sum);
+      const double density = expected / times;
+      const double weight = piece.weight * regions_.luminance(k) / density;
+      list.push_back({k, piece, weight + (first ? 0 : list.back().sum), density});
     }
   }
 }

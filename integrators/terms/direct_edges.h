@@ -34,8 +34,8 @@ struct DirectPoint {
 
 // Appends to `drawn` as many points, stratified over the weights; `points` for each of `samples`.
 // Books them.
-void draw_pieces(const EdgeSamplerInput& edges, std::span<const DirectPieces::Piece> pieces, Rng rng,
-                  int points, int samples, TermCost& cost, std::vector<DirectPoint>& drawn);
+void draw_pieces(const EdgeSamplerInput& edges, std::span<const DirectPieces::Piece> pieces,
+                 Rng rng, int points, int samples, TermCost& cost, std::vector<DirectPoint>& drawn);
 
 // What the calling thread has listed so far. Lists take time that samples and rays do not tell: a
 // pilot charges it by the difference.

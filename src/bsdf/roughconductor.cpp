@@ -116,8 +116,7 @@ Rgb<S> RoughConductor::coloured(const S& cos_h, const S& common, const Rgb<T>& s
   if constexpr (std::is_same_v<S, Dual>) {
     if (!index_is_constant()) {
       Rgb<S> reflectance;
-      for (int c = 0; c < 3; ++c)
-        reflectance[c] = microfacet::fresnel_conductor(cos_h, n[c], m[c]);
+      for (int c = 0; c < 3; ++c) reflectance[c] = microfacet::fresnel_conductor(cos_h, n[c], m[c]);
       return specular * reflectance * common;
     }
   }
