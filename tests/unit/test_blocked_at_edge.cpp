@@ -37,7 +37,7 @@ TEST(BlockedAtEdge, AgreesWithRaysCloseBy) {
     scene.shapes[0].mesh = fan(wings, rng);
     std::vector<FaceRef> faces;
     for (int f = 0; f < wings; ++f) faces.push_back({ShapeId(0), FaceId(f)});
-    EdgeStart edge{{faces, {}}, {0, 0, -1}, {0, 0, 1}, {}};
+    EdgeStart edge{{std::span<const FaceRef>(faces), {}}, {0, 0, -1}, {0, 0, 1}, {}};
     const auto tracer = make_brute_force_tracer(scene);
     for (int k = 0; k < 20; ++k) {
       const FaceRef start = faces[static_cast<uint32_t>(rng.uniform() * wings)];
@@ -72,7 +72,8 @@ TEST(BlockedAtEdge, RightAngle) {
   const Vec3d into[] = {{1, 0, 0}, {0, 1, 0}};
   const auto tracer = make_brute_force_tracer(scene);
   const auto blocked = [&](int start, const Vec3d& direction) {
-    const EdgeStart edge{{faces, {}}, {0, 0, -1}, {0, 0, 1}, {faces[start], into[start]}};
+    const EdgeStart edge{
+        {std::span<const FaceRef>(faces), {}}, {0, 0, -1}, {0, 0, 1}, {faces[start], into[start]}};
     const auto side = blocked_at_edge(scene, *tracer, edge, normalize(direction));
     return side ? std::optional(side->face) : std::nullopt;
   };
@@ -101,7 +102,8 @@ TEST(BlockedAtEdge, WhatOverlapsDoesNotBlock) {
     const auto tracer = make_brute_force_tracer(scene);
     const auto blocked = [&](int start, const Vec3d& direction) {
       const FaceSide side = side_of_face(scene, faces[start], x0, {0, 0, 1});
-      const auto found = blocked_at_edge(scene, *tracer, {{faces, {}}, x0, x1, side}, direction);
+      const auto found = blocked_at_edge(
+          scene, *tracer, {{std::span<const FaceRef>(faces), {}}, x0, x1, side}, direction);
       return found ? std::optional(found->face) : std::nullopt;
     };
     const Vec3d direction = random_direction(rng);
