@@ -1,6 +1,8 @@
 // Which numbers of a scene get slots, and what becomes of their derivatives.
 #include "integrators/backward/parameter_slots.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <set>
 #include <utility>
@@ -85,7 +87,12 @@ SeededCopies<T> seeded_copies(const T& object, const std::vector<ChannelSlots>& 
       for (size_t c = 0; c < 3; ++c) seed(k, {c}, {slots[k][c], slots[k][c], slots[k][c]});
     }
   }
-  CHECK_LE(9 + 3 * kLanes * static_cast<int>(copies.size()), detail::Jacobian::kMost);
+  if (9 + 3 * kLanes * static_cast<int>(copies.size()) > detail::Jacobian::kMost) {
+    throw InputError(
+        fmt::format("one material or light has {} parameters, too many for reverse mode at once: "
+                    "name fewer of them",
+                    parameters.size()));
+  }
   return copies;
 }
 

@@ -24,7 +24,7 @@ Probed::Spread Probed::spread(int lane, bool turned) const {
     squared = pilot.squared_means(slot, lane);
     // A turn that takes a share of the variance is taken to do so with the squared mean.
     for (size_t i = 0; i < cells.size(); ++i) {
-      if (cells[i] < held[i]) squared[i] *= std::max(cells[i], 0.0) / held[i];
+      if (held[i] > 0 && cells[i] < held[i]) squared[i] *= std::max(cells[i], 0.0) / held[i];
       squared[i] *= shared;
     }
     result.variances[slot] += shared * trimmed_mean(cells);

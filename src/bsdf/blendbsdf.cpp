@@ -32,7 +32,7 @@ class Blend final : public BothScalars<Blend, NestingBsdf> {
     Rgb<S> f;
     for (size_t i = 0; i < 2; ++i) {
       const Bsdf* const bsdf = side_of(i, front);
-      if (bsdf) f += bsdf->eval(n, wi, wo, at_of(i, at)) * weight(i, at);
+      if (bsdf) f += bsdf->eval(n, wi, wo, at_of(i, front, at)) * weight(i, at);
     }
     return f;
   }
@@ -43,7 +43,7 @@ class Blend final : public BothScalars<Blend, NestingBsdf> {
     for (size_t i = 0; i < 2; ++i) {
       const Bsdf* const bsdf = side_of(i, front);
       SmoothRays<S> of;
-      const int more = bsdf ? bsdf->smooth_rays(n, wi, of, at_of(i, at)) : 0;
+      const int more = bsdf ? bsdf->smooth_rays(n, wi, of, at_of(i, front, at)) : 0;
       for (int k = 0; k < more; ++k) {
         rays[count] = of[k];
         rays[count].weight = of[k].weight * weight(i, at);
@@ -67,7 +67,8 @@ class Blend final : public BothScalars<Blend, NestingBsdf> {
     double albedo[2] = {0, 0};
     for (size_t i = 0; i < 2; ++i) {
       const Bsdf* const bsdf = side_of(i, front);
-      if (bsdf && bsdf->is_rough()) albedo[i] = weight(i, at) * bsdf->lobe(at_of(i, at)).albedo;
+      if (bsdf && bsdf->is_rough())
+        albedo[i] = weight(i, at) * bsdf->lobe(at_of(i, front, at)).albedo;
     }
     const auto is_rough = [&](size_t i) {
       const Bsdf* const bsdf = side_of(i, front);
@@ -84,7 +85,8 @@ class Blend final : public BothScalars<Blend, NestingBsdf> {
     double pdf = 0;
     for (size_t i = 0; i < 2; ++i) {
       const Bsdf* const bsdf = side_of(i, front);
-      if (bsdf) pdf += (i ? share : 1 - share) * bsdf->pdf_solid_angle(n, wi, wo, at_of(i, at));
+      if (bsdf)
+        pdf += (i ? share : 1 - share) * bsdf->pdf_solid_angle(n, wi, wo, at_of(i, front, at));
     }
     return pdf;
   }
@@ -94,12 +96,12 @@ class Blend final : public BothScalars<Blend, NestingBsdf> {
     const size_t i = u1 < share ? 1 : 0;
     const double rest = i ? u1 / share : (u1 - share) / (1 - share);
     const Bsdf* const bsdf = side_of(i, front);
-    return bsdf ? bsdf->sample(n, wi, rest, u2, at_of(i, at)) : std::nullopt;
+    return bsdf ? bsdf->sample(n, wi, rest, u2, at_of(i, front, at)) : std::nullopt;
   }
   double eta_from(bool front, const Rgb<double>* at) const override {
     for (size_t i = 0; i < 2; ++i) {
       const Bsdf* const bsdf = side_of(i, front);
-      if (bsdf && bsdf->lobes().below) return bsdf->eta(at_of(i, at));
+      if (bsdf && bsdf->lobes().below) return bsdf->eta(at_of(i, front, at));
     }
     return 1;
   }
@@ -109,7 +111,7 @@ class Blend final : public BothScalars<Blend, NestingBsdf> {
     for (size_t i = 0; i < 2; ++i) {
       const Bsdf* const bsdf = side_of(i, front);
       if (!bsdf || !bsdf->is_rough()) continue;
-      LobeSummary lobe = bsdf->lobe(at_of(i, at));
+      LobeSummary lobe = bsdf->lobe(at_of(i, front, at));
       if (at || weight_.texture < 0) lobe.albedo *= weight(i, at);
       all = all.albedo == 0 ? lobe : LobeSummary(kHemisphere, 1, all.albedo + lobe.albedo);
     }
@@ -121,7 +123,7 @@ class Blend final : public BothScalars<Blend, NestingBsdf> {
     for (size_t i = 0; i < 2; ++i) {
       const Bsdf* const bsdf = side_of(i, front);
       if (!bsdf || !bsdf->lobes().below) continue;
-      const PassedLobe of = bsdf->passed_lobe(n, wi, at_of(i, at));
+      const PassedLobe of = bsdf->passed_lobe(n, wi, at_of(i, front, at));
       all = all.lobe.albedo == 0 ? of : PassedLobe{-n, {kHemisphere, 1, 1}};
     }
     return all;

@@ -1,4 +1,6 @@
 // Bump maps: normals of a surface that is displaced by the heights of a texture.
+#include <fmt/format.h>
+
 #include "limn/core/tangent.h"
 #include "src/bsdf/mapped_normal.h"
 
@@ -31,7 +33,7 @@ class BumpMap final : public MappedNormal<BumpMap> {
     return list;
   }
   std::string describe() const override {
-    return "bumpmap, " + text_of(gradient_) + " (" + text_of_inside() + ")";
+    return fmt::format("bumpmap, {}, scale {:g}{}", text_of(gradient_), scale_, text_of_inside());
   }
 
  private:

@@ -30,14 +30,16 @@ class MappedNormal : public BothScalars<Map, NestingBsdf> {
     if (!is_seen(front, value(n), value(wi), value(wo))) return {};
     const Vec3<S> n_b = bent(n, wi, at);
     if (!is_on_one_side(value(n), value(n_b), value(wo))) return {};
-    return this->side_of(0, front)->eval(n_b, wi, wo, this->at_of(0, at)) * shadow(n, n_b, wo);
+    return this->side_of(0, front)->eval(n_b, wi, wo, this->at_of(0, front, at)) *
+           shadow(n, n_b, wo);
   }
   // What would leave on different sides of n and n_b is zero.
   template <class S>
   int rays(bool front, const Vec3<S>& n, const Vec3<S>& wi, SmoothRays<S>& rays,
            const Rgb<S>* at) const {
     const Vec3<S> n_b = bent(n, wi, at);
-    const int count = this->side_of(0, front)->smooth_rays(n_b, wi, rays, this->at_of(0, at));
+    const int count =
+        this->side_of(0, front)->smooth_rays(n_b, wi, rays, this->at_of(0, front, at));
     for (int k = 0; k < count; ++k) {
       SmoothRay<S>& ray = rays[k];
       const bool seen = is_on_one_side(value(n), value(n_b), value(ray.wo));
@@ -63,8 +65,11 @@ class MappedNormal : public BothScalars<Map, NestingBsdf> {
   // -1 where the map's slopes count the other way: from the back, where the map bends the normal
   // first and the BSDF inside turns it. Inside twosided, the surface is turned first (Mitsuba).
   double turned(double side) const { return this->side(false) ? side : 1; }
+  // What the map does that is no default, and the BSDF inside.
   std::string text_of_inside() const {
-    return const_cast<MappedNormal*>(this)->nested()[0]->describe();  // NOLINT
+    return std::string(options_.flips ? "" : ", not flipped") +
+           (options_.shadows ? "" : ", without shadows") + " (" +
+           const_cast<MappedNormal*>(this)->nested()[0]->describe() + ")";  // NOLINT
   }
 
  private:
@@ -80,14 +85,14 @@ class MappedNormal : public BothScalars<Map, NestingBsdf> {
     if (!is_seen(front, n, wi, wo)) return 0;
     const Vec3d n_b = bent(n, wi, at);
     if (!is_on_one_side(n, n_b, wo)) return 0;
-    return this->side_of(0, front)->pdf_solid_angle(n_b, wi, wo, this->at_of(0, at));
+    return this->side_of(0, front)->pdf_solid_angle(n_b, wi, wo, this->at_of(0, front, at));
   }
   BsdfValue eval_with_pdf_from(bool front, const Vec3d& n, const Vec3d& wi, const Vec3d& wo,
                                const Rgb<double>* at) const final {
     if (!is_seen(front, n, wi, wo)) return {};
     const Vec3d n_b = bent(n, wi, at);
     if (!is_on_one_side(n, n_b, wo)) return {};
-    BsdfValue f = this->side_of(0, front)->eval_with_pdf(n_b, wi, wo, this->at_of(0, at));
+    BsdfValue f = this->side_of(0, front)->eval_with_pdf(n_b, wi, wo, this->at_of(0, front, at));
     f.value = f.value * shadow(n, n_b, wo);
     return f;
   }
@@ -95,22 +100,23 @@ class MappedNormal : public BothScalars<Map, NestingBsdf> {
                                    double u2, const Rgb<double>* at) const final {
     if (!(dot(n, wi) > 0)) return std::nullopt;
     const Vec3d n_b = bent(n, wi, at);
-    const auto wo = this->side_of(0, front)->sample(n_b, wi, u1, u2, this->at_of(0, at));
+    const auto wo = this->side_of(0, front)->sample(n_b, wi, u1, u2, this->at_of(0, front, at));
     return wo && is_on_one_side(n, n_b, *wo) ? wo : std::nullopt;
   }
   double eta_from(bool front, const Rgb<double>* at) const final {
-    return this->side_of(0, front)->eta(this->at_of(0, at));
+    return this->side_of(0, front)->eta(this->at_of(0, front, at));
   }
   LobeSummary lobe_from(bool front, const Rgb<double>* at) const final {
-    return this->side_of(0, front)->lobe(this->at_of(0, at));
+    return this->side_of(0, front)->lobe(this->at_of(0, front, at));
   }
   Bsdf::PassedLobe passed_lobe_from(bool front, const Vec3d& n, const Vec3d& wi,
                                     const Rgb<double>* at) const final {
-    return this->side_of(0, front)->passed_lobe(bent(n, wi, at), wi, this->at_of(0, at));
+    return this->side_of(0, front)->passed_lobe(bent(n, wi, at), wi, this->at_of(0, front, at));
   }
   Vec3d scattering_normal_from(bool front, const Vec3d& n, const Vec3d& wi,
                                const Rgb<double>* at) const final {
-    return this->side_of(0, front)->scattering_normal(bent(n, wi, at), wi, this->at_of(0, at));
+    return this->side_of(0, front)->scattering_normal(bent(n, wi, at), wi,
+                                                      this->at_of(0, front, at));
   }
 
   template <class S>

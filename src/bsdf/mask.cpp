@@ -28,14 +28,14 @@ class Mask final : public BothScalars<Mask, NestingBsdf> {
   Rgb<S> evaluate(bool front, const Vec3<S>& n, const Vec3<S>& wi, const Vec3<S>& wo,
                   const Rgb<S>* at) const {
     const Bsdf* const bsdf = side_of(0, front);
-    return bsdf ? bsdf->eval(n, wi, wo, at_of(0, at)) * opacity(at) : Rgb<S>{};
+    return bsdf ? bsdf->eval(n, wi, wo, at_of(0, front, at)) * opacity(at) : Rgb<S>{};
   }
   // What is nested, then straight on.
   template <class S>
   int rays(bool front, const Vec3<S>& n, const Vec3<S>& wi, SmoothRays<S>& rays,
            const Rgb<S>* at) const {
     const Bsdf* const bsdf = side_of(0, front);
-    const int count = bsdf ? bsdf->smooth_rays(n, wi, rays, at_of(0, at)) : 0;
+    const int count = bsdf ? bsdf->smooth_rays(n, wi, rays, at_of(0, front, at)) : 0;
     const S o = opacity(at);
     for (int k = 0; k < count; ++k) rays[k].weight = rays[k].weight * o;
     rays[count] = {-wi, grey(S(1.0 - o))};
@@ -53,26 +53,27 @@ class Mask final : public BothScalars<Mask, NestingBsdf> {
   double pdf_from(bool front, const Vec3d& n, const Vec3d& wi, const Vec3d& wo,
                   const Rgb<double>* at) const override {
     const Bsdf* const bsdf = side_of(0, front);
-    return bsdf ? bsdf->pdf_solid_angle(n, wi, wo, at_of(0, at)) : 0;
+    return bsdf ? bsdf->pdf_solid_angle(n, wi, wo, at_of(0, front, at)) : 0;
   }
   std::optional<Vec3d> sample_from(bool front, const Vec3d& n, const Vec3d& wi, double u1,
                                    double u2, const Rgb<double>* at) const override {
     const Bsdf* const bsdf = side_of(0, front);
-    return bsdf ? bsdf->sample(n, wi, u1, u2, at_of(0, at)) : std::nullopt;
+    return bsdf ? bsdf->sample(n, wi, u1, u2, at_of(0, front, at)) : std::nullopt;
   }
   double eta_from(bool front, const Rgb<double>* at) const override {
     const Bsdf* const bsdf = side_of(0, front);
-    return bsdf ? bsdf->eta(at_of(0, at)) : 1;
+    return bsdf ? bsdf->eta(at_of(0, front, at)) : 1;
   }
   LobeSummary lobe_from(bool front, const Rgb<double>* at) const override {
     const Bsdf* const bsdf = side_of(0, front);
-    LobeSummary lobe = bsdf ? bsdf->lobe(at_of(0, at)) : LobeSummary(kHemisphere, 1, 0);
+    LobeSummary lobe = bsdf ? bsdf->lobe(at_of(0, front, at)) : LobeSummary(kHemisphere, 1, 0);
     if (at || opacity_.texture < 0) lobe.albedo *= opacity(at);
     return lobe;
   }
   PassedLobe passed_lobe_from(bool front, const Vec3d& n, const Vec3d& wi,
                               const Rgb<double>* at) const override {
-    PassedLobe passed = side_of(0, front)->passed_lobe(n, wi, at_of(0, at));
+    if (!side_of(0, front)) return {-n, {}};
+    PassedLobe passed = side_of(0, front)->passed_lobe(n, wi, at_of(0, front, at));
     if (at || opacity_.texture < 0) passed.lobe.albedo *= opacity(at);
     return passed;
   }

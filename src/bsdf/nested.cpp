@@ -36,7 +36,14 @@ void NestingBsdf::add_nested(bool straight) {
       lobes.through |= side->lobes().through;
     }
   }
-  for (const auto& bsdf : nested_) texture_count_ += bsdf->texture_count();
+  for (const auto& bsdf : nested_) {
+    // Of twosided, the second has its textures behind the first's.
+    const auto sides = bsdf->nested();
+    const bool two = sides.size() == 2 && bsdf->side(false) == sides[1].get();
+    first_[true].push_back(texture_count_);
+    first_[false].push_back(texture_count_ + (two ? sides[0]->texture_count() : 0));
+    texture_count_ += bsdf->texture_count();
+  }
   lobes_ = of[true];
   if (of[false].above || of[false].below || of[false].smooth) set_back(of[false]);
 }

@@ -37,7 +37,10 @@ class NestingBsdf : public SidedBsdf {
  protected:
   explicit NestingBsdf(std::vector<std::shared_ptr<Bsdf>> nested) : nested_(std::move(nested)) {}
   NestingBsdf(const NestingBsdf& other)
-      : SidedBsdf(other), nested_(other.nested_), own_textures_(other.own_textures_) {
+      : SidedBsdf(other),
+        nested_(other.nested_),
+        own_textures_(other.own_textures_),
+        first_{other.first_[0], other.first_[1]} {
     for (auto& bsdf : nested_) bsdf = bsdf->clone();
   }
   // For constructors, after textures of their own. straight: whether light also passes by itself.
@@ -46,12 +49,10 @@ class NestingBsdf : public SidedBsdf {
 
   // Of the i-th nested BSDF; null if that side is black.
   const Bsdf* side_of(size_t i, bool front) const { return nested_[i]->side(front); }
-  // The values of its textures.
+  // The values of that side's textures.
   template <class S>
-  const Rgb<S>* at_of(size_t i, const Rgb<S>* at) const {
-    int first = own_textures_;
-    for (size_t k = 0; k < i; ++k) first += nested_[k]->texture_count();
-    return at ? at + first : nullptr;
+  const Rgb<S>* at_of(size_t i, bool front, const Rgb<S>* at) const {
+    return at ? at + first_[front][i] : nullptr;
   }
   void add_nested_parameters(std::vector<ParameterRef>& list) {
     for (size_t i = 0; i < nested_.size(); ++i) {
@@ -77,6 +78,7 @@ class NestingBsdf : public SidedBsdf {
 
   std::vector<std::shared_ptr<Bsdf>> nested_;
   int own_textures_ = 0;
+  std::vector<int> first_[2];  // [front][i]: of all textures, the first of the i-th's side
 };
 
 // Nested BSDFs of an element, `count` of them. InputError if there are more or less, or if they

@@ -39,9 +39,7 @@ class NormalMap final : public MappedNormal<NormalMap> {
     list.insert(list.end(), own.begin(), own.end());
     return list;
   }
-  std::string describe() const override {
-    return "normalmap, " + text_of(map_) + " (" + text_of_inside() + ")";
-  }
+  std::string describe() const override { return "normalmap, " + text_of(map_) + text_of_inside(); }
 
  private:
   bool own_is_constant() const override { return limn::is_constant(map_.constant); }

@@ -136,8 +136,10 @@ class Bitmap final : public Texture {
   std::vector<ParameterRef> parameters() override { return {}; }
   std::shared_ptr<Texture> clone() const override { return std::make_shared<Bitmap>(*this); }
   std::string describe() const override {
-    return fmt::format("bitmap {} ({} x {}){}", settings_.file, texels_->width(), texels_->height(),
-                       settings_.to_uv.describe());
+    const char* const wraps[] = {"", ", mirror", ", clamp"};  // of Wrap
+    return fmt::format("bitmap {} ({} x {}){}{}{}", settings_.file, texels_->width(),
+                       texels_->height(), settings_.nearest ? ", nearest" : "",
+                       wraps[static_cast<int>(settings_.wrap)], settings_.to_uv.describe());
   }
 
  private:

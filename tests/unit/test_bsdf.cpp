@@ -465,6 +465,43 @@ TEST(Bsdf, DerivativesOfParametersMatchDifferences) {
   }
 }
 
+// From behind, a BSDF around twosided reads the textures of the back.
+TEST(Bsdf, NestedSidesHaveTheirOwnTextures) {
+  const auto checkerboard = [] {
+    TestProperties properties("texture", "checkerboard");
+    return make_texture(properties);
+  };
+  const auto textured = [&] {
+    TestProperties properties("bsdf", "diffuse");
+    properties.textures["reflectance"] = checkerboard();
+    return make_bsdf(properties);
+  };
+  for (const std::string type : {"mask", "blendbsdf", "normalmap"}) {
+    TestProperties sides("bsdf", "twosided", {}, {textured(), textured()});
+    std::vector<std::shared_ptr<Bsdf>> nested{make_bsdf(sides)};
+    if (type == "blendbsdf") nested.insert(nested.begin(), textured());
+    TestProperties properties("bsdf", type, {{"weight", 0.5}}, nested);
+    if (type == "normalmap") properties.textures["normalmap"] = checkerboard();
+    const auto original = make_bsdf(properties);
+    for (const auto& bsdf : {original, original->clone()}) {
+      // The map's own: its colour, the tangent and the outward normal.
+      const Rgb<double> own[] = {{0.5, 0.5, 1}, {1, 0, 0}, {0, 0, 1}};
+      std::vector<Rgb<double>> at;
+      for (int k = 0; k < bsdf->texture_count(); ++k) {
+        const std::string name = bsdf->texture_name(k);
+        const bool is_back = name.find("back.") != std::string::npos;
+        at.push_back(name == "normalmap" ? own[k] : Rgb<double>{1.0 - is_back, 1.0 * is_back, 0});
+      }
+      for (const bool front : {true, false}) {
+        const Vec3d n{0, 0, front ? 1.0 : -1.0};
+        const Rgb<double> f = bsdf->side(front)->eval(n, n, n, at.data());
+        EXPECT_GT(front ? f.r : f.g, 0.1) << type << front;
+        EXPECT_EQ(front ? f.g : f.r, 0) << type << front;
+      }
+    }
+  }
+}
+
 TEST(Bsdf, CloneIsIndependent) {
   const auto inner = make_diffuse(Rgb<double>{0.5, 0.5, 0.5});
   TestProperties properties("bsdf", "twosided", {}, {inner});
