@@ -25,7 +25,7 @@ TYPES = {
                    "volpathmis"],
     "sensor": ["perspective", "batch", "orthographic", "thinlens"],
     "film": ["hdrfilm"],
-    "rfilter": ["box", "gaussian", "tent"],
+    "rfilter": ["box", "catmullrom", "gaussian", "lanczos", "mitchell", "tent"],
     "sampler": ["independent", "ldsampler", "multijitter", "orthogonal", "stratified"],
     "shape": ["bsplinecurve", "cube", "cylinder", "disk", "instance", "linearcurve", "obj", "ply",
               "rectangle", "serialized", "shapegroup", "sphere"],
