@@ -20,7 +20,7 @@ class RadianceColumns {
   // it. 64 bytes for every texel: InputError if memory does not hold them.
   using Lookup = std::function<Rgb<double>(int, double)>;
   RadianceColumns(const Environment::Grid& grid, const Lookup& radiance, int threads);
-  // The same for an environment, which must have a grid.
+  // The columns of an environment, which must have a grid of texels.
   RadianceColumns(const Environment& environment, int threads);
 
   const Environment::Grid& grid() const { return grid_; }
@@ -54,7 +54,7 @@ class RadianceColumns {
     std::vector<uint32_t> cell;  // before `weigh` a meridian's column, then the table's cell
     std::vector<float> share;    // of the next cell
     std::vector<float> across, sign;
-    // What the four colours of a cell are multiplied by, the sign included.
+    // The signed weights of the four colours of a cell.
     struct alignas(16) Weights {
       float of[4];
     };

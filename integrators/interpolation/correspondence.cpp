@@ -32,8 +32,8 @@ struct Group {
   bool crosses(const Indices& at, const Indices* own) const;
   // Drops pairs that other items hold.
   void drop_repeated();
-  // Whether the rules allow an item of these corners. Then `same` is the item that it completes or
-  // repeats, if there is one.
+  // Whether the rules of correspondence allow an item with these corners. If so, `same` is set to
+  // the item that it completes or repeats, if there is one.
   bool allows(const Indices& at, int& same) const;
 };
 

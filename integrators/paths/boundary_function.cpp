@@ -39,8 +39,8 @@ void accumulate(std::vector<uint32_t>& offsets) {
   }
 }
 
-// Of the runs [offsets[e], offsets[e + 1]) of values, if there are any, those of the edges that are
-// kept.
+// `values` holds a run [offsets[e], offsets[e + 1]) for each edge e, or nothing. Keeps the runs of
+// the edges in `kept`.
 template <class T>
 void keep_runs(const std::vector<size_t>& kept, const std::vector<uint32_t>& offsets,
                std::vector<T>& values) {

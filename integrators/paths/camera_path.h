@@ -30,7 +30,7 @@ inline FilmPosition sample_pixel_filter(const Film& film, const FilterTable& fil
   return sample_pixel_filter(film, filter, x, y, {u, rng.uniform()});
 }
 
-// What the sample counts.
+// The weight of a sample of pixel (x, y) at a film position: filter over density.
 inline double pixel_filter_weight(const Film& film, const FilterTable& filter, int x, int y,
                                   const FilmPosition& at) {
   if (!film.filter.is_signed()) return 1;

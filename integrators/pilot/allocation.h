@@ -33,12 +33,12 @@ struct TermFigures {
   double first = 0;
   DrawShares shares = {};  // of the variance
   bool on_film = false;    // its samples are stratified over the film, also where they are few
-  // Of the sample's mean, as a mean over pixels and in every cell. A term that a path leaves out
-  // adds 0: less than one sample adds this to the variance.
+  // The square of a sample's mean, averaged over pixels, and in every cell. A path without the term
+  // adds 0, so fewer than one sample per path adds this square to the variance.
   double squared_mean = 0;
   std::vector<double> cells_squared = {};
 
-  // What so many samples leave of the variance of one, where that is `own` and the squared mean so.
+  // The variance with so many samples. One has the variance `own` and the squared mean `squared`.
   double left_by(double samples, double own, double squared) const {
     if (samples < 1 && !on_film) return (own + squared) / samples - squared;
     return own * (shares.kept + (1 - shares.kept) * std::pow(samples, -shares.power));

@@ -26,7 +26,7 @@ class Covariances {
   float of(int i, int j) const { return i < j ? of(j, i) : entries_[i * (i + 1) / 2 + j]; }
   float variance(int parameter) const { return own(parameter)[0]; }
   float with(int parameter, int unknown) const { return own(parameter)[1 + unknown]; }
-  // Of the mean, unbiased: it may be negative.
+  // An unbiased estimate of the mean's square; it may be negative.
   float squared_mean(int parameter) const { return own(parameter)[1 + kUnknowns]; }
 
   static size_t size(int parameters) { return kShared + static_cast<size_t>(parameters) * kOwn; }

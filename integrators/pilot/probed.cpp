@@ -22,7 +22,7 @@ Probed::Spread Probed::spread(int lane, bool turned) const {
     std::vector<double>&cells = result.cells[slot], &squared = result.cells_squared[slot];
     cells = fitted ? fit.variances[lane][slot] : held;
     squared = pilot.squared_means(slot, lane);
-    // A turn that takes a share of the variance is taken to do so with the squared mean.
+    // Assumption: a turn reduces the squared mean by the same factor as the variance.
     for (size_t i = 0; i < cells.size(); ++i) {
       if (held[i] > 0 && cells[i] < held[i]) squared[i] *= std::max(cells[i], 0.0) / held[i];
       squared[i] *= shared;

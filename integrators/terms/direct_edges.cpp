@@ -19,8 +19,8 @@ DirectPoint point_at(const DirectPieces::Piece& piece, double u, double times) {
   return {piece.region, {piece.piece.edge, t, density, times * piece.density}};
 }
 
-// What the sides of an emitter add cancels but for its size: none of them is left out, and all are
-// met at the same places.
+// The contributions of an emitter's sides nearly cancel. So every sample takes a point on each
+// side, all at the same place along it.
 void draw_sides(std::span<const DirectPieces::Piece> sides, double u, int samples, TermCost& cost,
                 std::vector<DirectPoint>& drawn) {
   cost.samples += sides.size() * static_cast<uint64_t>(samples);

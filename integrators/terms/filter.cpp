@@ -48,7 +48,7 @@ Layer draw_gaussian(const Filter& filter, const FilterTable& table, const Film::
   return layer;
 }
 
-// Weights that fall and rise have no layers: pairs are drawn by width.
+// A filter with negative lobes has no layers: pairs are drawn by their width.
 Layer draw_signed(const Filter& filter, const FilterTable& table, const Film::Range& range,
                   double u, double v) {
   const double half = filter.radius * u, across = table.quantile(range.lower, range.upper, v);

@@ -33,7 +33,7 @@ class MappedNormal : public BothScalars<Map, NestingBsdf> {
     return this->side_of(0, front)->eval(n_b, wi, wo, this->at_of(0, front, at)) *
            shadow(n, n_b, wo);
   }
-  // What would leave on different sides of n and n_b is zero.
+  // Rays that leave on different sides of n and n_b have the weight zero.
   template <class S>
   int rays(bool front, const Vec3<S>& n, const Vec3<S>& wi, SmoothRays<S>& rays,
            const Rgb<S>* at) const {

@@ -37,7 +37,7 @@ void NestingBsdf::add_nested(bool straight) {
     }
   }
   for (const auto& bsdf : nested_) {
-    // Of twosided, the second has its textures behind the first's.
+    // In a twosided BSDF the textures of the back follow those of the front.
     const auto sides = bsdf->nested();
     const bool two = sides.size() == 2 && bsdf->side(false) == sides[1].get();
     first_[true].push_back(texture_count_);

@@ -49,7 +49,7 @@ class NestingBsdf : public SidedBsdf {
 
   // Of the i-th nested BSDF; null if that side is black.
   const Bsdf* side_of(size_t i, bool front) const { return nested_[i]->side(front); }
-  // The values of that side's textures.
+  // The values of the textures of the i-th BSDF's side.
   template <class S>
   const Rgb<S>* at_of(size_t i, bool front, const Rgb<S>* at) const {
     return at ? at + first_[front][i] : nullptr;

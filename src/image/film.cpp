@@ -12,7 +12,7 @@ namespace limn {
 
 namespace {
 
-// Of bins, beside a filter's peak of 1: those around a zero of the filter have some.
+// The least density of a bin, relative to the filter's peak: bins around its zeros need some.
 constexpr double kLeastDensity = 1e-3;
 
 // The gaussian minus its value at the radius, so that it ends continuously.

@@ -28,7 +28,7 @@ std::optional<Parameter> find_own(const std::vector<Parameter>& list, const Scen
   return std::nullopt;
 }
 
-// The same, by Mitsuba's name: it counts what is nested.
+// Also finds Mitsuba's names, which number nested BSDFs.
 std::optional<Parameter> find_nested(const std::vector<Parameter>& list, const Scene& scene,
                                      const std::string& name) {
   if (auto found = find_own(list, scene, name)) return found;

@@ -102,7 +102,7 @@ class Bsdf {
                                   const Rgb<double>* /*at*/) const {
     return n;
   }
-  // Whether that is another than n, here or of a nested BSDF.
+  // Whether this BSDF, or one nested in it, scatters about another normal than n.
   virtual bool maps_normals() {
     const auto inside = nested();
     return std::any_of(inside.begin(), inside.end(), [](auto& b) { return b->maps_normals(); });

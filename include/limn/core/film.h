@@ -21,7 +21,7 @@ struct Filter {
   double slope(double x) const;  // the derivative of eval; at a tent's tip 0
   // Integral of the filter from -radius to x.
   double integral(double x) const;
-  // Whether it may be negative somewhere.
+  // Whether the filter has negative lobes.
   bool is_signed() const { return kind == Kind::kCubic || kind == Kind::kLanczos; }
   // The inverse of the filter's cumulative distribution on [lower, upper]: the offset below which
   // the fraction u of the filter's integral over [lower, upper] lies. That integral must be
@@ -34,21 +34,21 @@ Filter lanczos_filter(int lobes);
 
 // A table of filter quantiles: piecewise polynomials in the integral up to x < 0. Each power of two
 // has the same number of knots, since x varies as the root of the integral near the end. For a
-// filter that is negative somewhere, a density that is constant in narrow bins, near the filter's
-// magnitude there.
+// filter with negative lobes the table holds a density instead, constant in narrow bins and close
+// to the filter's absolute value.
 class FilterTable {
  public:
   explicit FilterTable(const Filter& filter);
 
-  // Filter::quantile to rounding, or that of the bins. For u uniform in [0, 1) it gives an offset
-  // with the density pdf [1 / pixel], of which eval(x) / (integral(upper) - integral(lower)) is
-  // `weight` times as much: 1 but for bins.
+  // The quantile of the filter (to rounding) or of the bins. For u uniform in [0, 1) the offset has
+  // the density `pdf` [1 / pixel]. The normalised filter, eval(x) / (integral(upper) -
+  // integral(lower)), is `weight` times `pdf`; without bins the weight is 1.
   double quantile(double lower, double upper, double u) const;
   double pdf(double lower, double upper, double x) const;
   double weight(double lower, double upper, double x) const;
 
  private:
-  // Of bins: the integral of their density, up to a factor, from -radius to x.
+  // The integral of the bins' unnormalised density from -radius to x.
   static constexpr int kBins = 32;  // per pixel
   double mass(double x) const;
 

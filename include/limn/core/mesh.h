@@ -54,7 +54,7 @@ enum class UvSource : uint8_t {
   kDisk,    // place in the unit disk: distance from the center, azimuth over 2 pi
   kFaces,   // u = x, v = y, the barycentric coordinates of each face, where a file has none
 };
-// Whether u and v are linear over a face.
+// Whether u and v vary linearly over each face.
 inline bool is_linear(UvSource source) {
   return source == UvSource::kPlane || source == UvSource::kFaces;
 }
