@@ -367,11 +367,30 @@ class Checker {
   }
 
   Residual residual_of(const Runs& runs) const {
-    const Film& film = scene_.film;
-    const auto radiance =
-        sum_blocks(means(runs.gradient.radiance), film.crop_width, film.crop_height, fine_);
-    return {windows_, runs.gradient, runs.differences.extrapolated,
-            radiance, runs.step,     edges_move_};
+    const Moments& radiance = runs.gradient.radiance;
+    const auto blocks = [&](const std::vector<double>& image) {
+      return sum_blocks(image, scene_.film.crop_width, scene_.film.crop_height, fine_);
+    };
+    std::vector<double> magnitudes = means(radiance), largest;
+    const std::vector<double> sums = blocks(magnitudes);
+    if (edges_move_) {
+      // Where m is the mean and q the mean square of a sample, those that are not black, few as
+      // they may be, are q / |m| large (filters may be negative): of three channels at once. In a
+      // block that got no light they may be as large as elsewhere on the film.
+      std::vector<double> squares = variances(radiance);
+      for (size_t i = 0; i < squares.size(); ++i) {
+        squares[i] = squares[i] * radiance.samples() + magnitudes[i] * magnitudes[i];
+        magnitudes[i] = std::fabs(magnitudes[i]);
+      }
+      largest = blocks(squares);
+      const std::vector<double> shares = blocks(magnitudes);
+      const double share = mean_of(shares);
+      const double elsewhere = share > 0 ? mean_of(largest) / share : 0;
+      for (size_t i = 0; i < largest.size(); ++i) {
+        largest[i] = 3 * (shares[i] > 0 ? largest[i] / shares[i] : elsewhere);
+      }
+    }
+    return {windows_, runs.gradient, runs.differences.extrapolated, sums, largest, runs.step};
   }
 
   // The second run, which takes the first one's place. False if it was interrupted.

@@ -112,7 +112,7 @@ std::vector<double> Windows::spread(const std::vector<double>& weights) const {
 
 Residual::Residual(const Windows& windows, const GradientResult& gradient,
                    const DifferenceEstimate& differences, const std::vector<double>& radiance,
-                   double step, bool edges_move)
+                   const std::vector<double>& largest, double step)
     : windows_(windows) {
   const ParameterGradient& g = gradient.parameters[0];
   gradient_ = gather(g.total_blocks);
@@ -124,7 +124,6 @@ Residual::Residual(const Windows& windows, const GradientResult& gradient,
   const std::vector<double> edges = magnitude_of_edges(gradient, g, of_differences);
   const auto samples = static_cast<double>(g.total_blocks.samples());
   const auto difference_samples = static_cast<double>(differences.blocks.samples());
-  const double pixels = static_cast<double>(windows.fine()) * windows.fine();
   const EventSizes of_edges = event_sizes(batches_of_edges(gradient));
   const EventSizes of_steps = event_sizes(differences.blocks.kept());
   for (size_t i = 0; i < edges.size(); ++i) {
@@ -132,10 +131,10 @@ Residual::Residual(const Windows& windows, const GradientResult& gradient,
     rare_gradient_.of_mean_size.push_back(edges[i] * of_edges.mean / samples);
     rare_gradient_.of_large_size.push_back(edges[i] * of_edges.large / samples);
     // Differences may hold all of it as events; one that has not been seen at all is as large as
-    // the light of a pixel, over both steps.
+    // a sample may be, over both steps.
     const double all =
         std::max({edges[i], std::fabs(of_differences[i]), std::fabs(g.total_blocks.mean(i))});
-    const double unseen = edges_move ? radiance[i] / pixels / (2 * step) : 0;
+    const double unseen = largest.empty() ? 0 : largest[i] / (2 * step);
     const double large = std::max(of_steps.large, unseen);
     rare_differences_.magnitude.push_back(all);
     rare_differences_.of_mean_size.push_back(all * of_steps.mean / difference_samples);

@@ -52,11 +52,12 @@ struct Score {
 // Gradient and differences of one parameter, from independent runs of at least two batches.
 class Residual {
  public:
-  // step: of the differences. edges_move: whether any may: a sample's image is then
-  // discontinuous in the step.
+  // radiance: of each block, the sum over pixels and channels. largest: how far at most a sample is
+  // expected to jump within `step`, that of the differences; empty where no edges move, whose
+  // samples' images are continuous.
   Residual(const Windows& windows, const GradientResult& gradient,
-           const DifferenceEstimate& differences, const std::vector<double>& radiance, double step,
-           bool edges_move);
+           const DifferenceEstimate& differences, const std::vector<double>& radiance,
+           const std::vector<double>& largest, double step);
 
   Score score(const Probe& probe) const;
   // Of each window alone; those without any variance and value are left out.

@@ -199,10 +199,11 @@ class GapFinder {
   void add_gap(FaceRef of_edges, FaceRef along, Gaps& gaps) const {
     const Corners edges = corners_of(of_edges), face = corners_of(along);
     const double rounding = touch_tolerance(largest_coordinate(edges), largest_coordinate(face));
+    const bool within = of_edges.shape == along.shape;
     for (int k = 0; k < 3; ++k) {
-      const auto gap = gap_along(edges[k], edges[(k + 1) % 3], face, rounding);
+      const auto gap = gap_along(edges[k], edges[(k + 1) % 3], face, rounding, within);
       if (!gap) continue;
-      if (of_edges.shape == along.shape &&
+      if (within &&
           (gap->length < kLeastLength || is_inside(of_edges, along, gap->height, rounding))) {
         continue;
       }
@@ -216,9 +217,11 @@ class GapFinder {
     double height;  // of the segment above the face; below zero behind it
     double length;  // of what they share [pixels]
   };
-  // Between the segment and the face that lies beside it, in the middle of what they share.
+  // Between the segment and the face that lies beside it, in the middle of what they share. Within
+  // one shape the segment lies above or below the face itself: what runs along it a little farther
+  // out may be the next but one of a fine surface.
   std::optional<Beside> gap_along(const Vec3d& a, const Vec3d& b, const Corners& face,
-                                  double rounding) const {
+                                  double rounding, bool within) const {
     const Vec3d normal = cross(face[1] - face[0], face[2] - face[0]);
     const double area = length(normal);
     if (!(area > 0)) return std::nullopt;
@@ -238,7 +241,7 @@ class GapFinder {
     for (int k = 0; k < 3; ++k) {
       const Vec3d side = face[(k + 1) % 3] - face[k];
       const Vec3d inward = cross(n, side) / length(side);
-      clip(dot(inward, a - face[k]), dot(inward, b - face[k]), -reach);
+      clip(dot(inward, a - face[k]), dot(inward, b - face[k]), within ? 0 : -reach);
     }
     if (to - from < kLeastPart) return std::nullopt;
     const double middle = 0.5 * (from + to);

@@ -463,6 +463,50 @@ TEST(HairGaps, AreNotBetweenNeighbours) {
   EXPECT_EQ(count(wedge(true)), 1u);
 }
 
+// Faces of a fine surface that run side by side, a face or two apart.
+TEST(HairGaps, AreNotInFineSurfaces) {
+  const TempFiles files;
+  SceneParts parts;
+  parts.body = R"(<shape type="cylinder" id="tube"><transform name="to_world">
+                    <scale x="0.18" y="0.18" z="0.9"/><rotate y="1" angle="70"/></transform>
+                  </shape>)";
+  std::vector<std::string> lines;
+  warn_of_hair_gaps(make_scene(files, parts), 15, 2, lines);
+  EXPECT_EQ(lines, std::vector<std::string>{});
+}
+
+// Light that a polished cube throws now and then where a floor ends: the gradient looks there often
+// enough to meet it, differences do not, and say nothing of how large it would be.
+TEST(CheckVerdict, RareLightWhereASideMovesIsNotNothing) {
+  const TempFiles files;
+  SceneParts parts;
+  parts.origin = {4, 4, 2};
+  parts.target = {0, 0.3, 0};
+  parts.fov = 45;
+  parts.width = parts.height = 24;
+  parts.body = square("floor", 2, -90, {0, 0, 0}, diffuse("chalk", "0.5, 0.5, 0.5")) +
+               R"(<shape type="cube"><transform name="to_world"><scale value="0.2"/>
+                    <rotate x="1" z="-0.3" angle="40"/><translate y="0.5"/></transform>
+                    <bsdf type="roughconductor"><float name="alpha" value="0.1"/></bsdf></shape>
+                  <emitter type="spot"><rgb name="intensity" value="40"/>
+                    <float name="cutoff_angle" value="6"/><transform name="to_world">
+                    <lookat origin="0, 4, 1" target="0, 0.4, 0" up="0, 0, 1"/></transform>
+                  </emitter>)";
+  const Scene scene = make_scene(files, parts);
+  CheckOptions options;
+  options.parameter = "floor.rotate.y";
+  options.samples = SampleCounts{1, 64, 1};
+  RunningMean z;
+  for (uint64_t seed = 0; seed < 8; ++seed) {
+    RunSettings settings;
+    settings.spp = 16;
+    settings.seed = seed;
+    const CheckResult r = check(scene, options, settings);
+    z.add(r.total.z);
+  }
+  EXPECT_LT(std::fabs(z.mean()), 4 / std::sqrt(8.0));
+}
+
 // The fewest successes of n, where each has this probability, in 999 of 1000 cases.
 int fewest(int n, double probability) {
   double below = 0, one = std::pow(1 - probability, n);
