@@ -173,12 +173,12 @@ std::vector<std::tuple<SampleCounts, std::string>> counts_and_files() {
   return cases;
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    , ClosedFormSamples, testing::ValuesIn(counts_and_files()),
-    [](const auto& test) {
-      const std::string file = std::get<1>(test.param);
-      return test_name(to_string(std::get<0>(test.param)) + "_" + file.substr(0, file.find('.')));
-    });
+INSTANTIATE_TEST_SUITE_P(, ClosedFormSamples, testing::ValuesIn(counts_and_files()),
+                         [](const auto& test) {
+                           const std::string file = std::get<1>(test.param);
+                           return test_name(to_string(std::get<0>(test.param)) + "_" +
+                                            file.substr(0, file.find('.')));
+                         });
 
 // Read once, for the list of tests.
 const Scene& listed_scene(const std::string& file) {
