@@ -32,7 +32,7 @@ class Package(unittest.TestCase):
         run(CMAKE, "--install", BUILD, "--prefix", PREFIX)
         cls.configured = run(CMAKE, "-S", HERE, "-B", CONSUMER, "-G", "Ninja",
                              f"-DCMAKE_PREFIX_PATH={PREFIX}", "-DCMAKE_BUILD_TYPE=Release")
-        run(CMAKE, "--build", CONSUMER)
+        cls.built = run(CMAKE, "--build", CONSUMER)
 
     # The Python module belongs into a wheel.
     def test_prefix_holds_the_package_alone(self):
@@ -41,6 +41,10 @@ class Package(unittest.TestCase):
     def test_finding_it_says_nothing_of_its_dependencies(self):
         for word in ("Warning", "warning", "not exist", "not found"):
             self.assertNotIn(word, self.configured)
+
+    def test_using_it_warns_of_nothing(self):
+        for word in ("warning:", "note:"):
+            self.assertNotIn(word, self.built)
 
     # The closed form's mean, within five standard errors (two sides: 6e-7).
     def test_program_renders_what_the_closed_form_says(self):
