@@ -135,6 +135,19 @@ class Docs(unittest.TestCase):
                 with self.subTest(tag=tag, type=name):
                     self.assertRegex(page, rf"{tag} {name}\s")
 
+    # Some are there only where a scene gives them.
+    def test_materials_have_all_their_numbers(self):
+        page = read(self.folder, "reference", "parameters.html")
+        rows = {re.sub("<[^>]*>", "", row).split()[1]: row for row in re.split("<tr[^>]*>", page)
+                if ">bsdf " in row}
+        for name, numbers in (("principled", "anisotropic clearcoat_gloss eta spec_trans specular"),
+                              ("principledthin", "anisotropic eta"),
+                              ("roughconductor", "alpha alpha_u alpha_v k"),
+                              ("roughdielectric", "alpha alpha_u alpha_v")):
+            for number in numbers.split():
+                with self.subTest(type=name, number=number):
+                    self.assertIn(f">{number}<", rows[name])
+
 
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory(prefix="limn_docs_") as made:

@@ -86,11 +86,18 @@ def methods_page():
 MAP = '<texture name="NAME" type="bitmap"><string name="filename" value="map.hdr"/>' \
       '<boolean name="raw" value="true"/></texture>'
 NESTED = '<bsdf type="diffuse" id="nested_ID"/>'
-# The elements that a type cannot do without.
+UNEVEN = '<float name="alpha_u" value="0.1"/><float name="alpha_v" value="0.2"/>'
+# Parameters that exclude others of a type: further elements.
+OTHERS = {"roughconductor": UNEVEN, "roughdielectric": UNEVEN,
+          "principled": '<float name="eta" value="1.5"/>'}
+# The elements that a type cannot do without, or that have parameters only where they are given.
 INSIDE = {
     "bsdf": {"blendbsdf": '<float name="weight" value="0.5"/>' + NESTED + NESTED.replace("_", "_2_"),
              "bumpmap": MAP + NESTED, "mask": '<float name="opacity" value="0.5"/>' + NESTED,
-             "normalmap": MAP.replace("NAME", "normalmap") + NESTED, "twosided": NESTED},
+             "normalmap": MAP.replace("NAME", "normalmap") + NESTED, "twosided": NESTED,
+             "principled": "".join(f'<float name="{name}" value="0.5"/>'
+                                   for name in ("anisotropic", "metallic", "spec_trans", "clearcoat")),
+             "principledthin": '<float name="anisotropic" value="0.5"/>'},
     "emitter": {"envmap": '<string name="filename" value="map.hdr"/>',
                 "projector": MAP.replace("NAME", "irradiance")},
 }
@@ -112,6 +119,8 @@ def example(folder):
         return f'<{tag} type="{name}" id="{name}">{inside}</{tag}>'
 
     on_shapes = [element("bsdf", name) for name in types("bsdf")] + [element("emitter", "area")]
+    on_shapes += [f'<bsdf type="{name}" id="other_{name}">{inside}</bsdf>'
+                  for name, inside in OTHERS.items()]
     free = [element("emitter", name) for name in types("emitter") if name not in ("area", "constant")]
     lines = ['<scene version="3.0.0">', '<sensor type="perspective"/>', *free,
              *(f'<shape type="rectangle">{inside}</shape>' for inside in on_shapes), "</scene>"]
