@@ -132,9 +132,18 @@ def test_types_hold(tmp_path):
 def test_importing_says_nothing_and_starts_nothing():
     code = ("import sys, threading, limn\n"
             "assert threading.active_count() == 1\n"
-            "assert 'torch' not in sys.modules")
+            "assert not {'jax', 'torch'} & {*sys.modules}")
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout + done.stderr == ""
+
+
+def test_naming_a_bridge_imports_it():
+    pytest.importorskip("jax")
+    done = subprocess.run([sys.executable, "-c", "import limn; limn.jax.render"],
+                          capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    with pytest.raises(AttributeError, match="module 'limn' has no attribute 'cupy'"):
+        limn.cupy
 
 
 # As PyTorch, scikit-learn and others load it. Its thread-local variables need space that the loader

@@ -7,6 +7,8 @@
 """
 
 from collections.abc import Mapping as _Mapping
+from importlib import import_module as _import_module
+from typing import TYPE_CHECKING as _TYPE_CHECKING
 
 from . import _processor
 
@@ -109,3 +111,12 @@ __all__ = [
 ]
 
 _Mapping.register(Parameters)
+
+# limn.torch and limn.jax import PyTorch and JAX when they are first named. Type checkers see none of
+# this, or they would take any name for one of limn's.
+if not _TYPE_CHECKING:
+
+    def __getattr__(name: str) -> object:
+        if name in ("jax", "torch"):
+            return _import_module(f"{__name__}.{name}")
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -6,7 +6,7 @@
 
     slope = jax.grad(loss)(scene["ball.vertex_positions"])
 
-Imports jax, which `import limn` does not.
+Naming limn.jax imports jax, `import limn` does not.
 """
 
 from __future__ import annotations

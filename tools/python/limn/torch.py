@@ -4,7 +4,7 @@
     image = limn.torch.render(scene, {"ball.vertex_positions": v}, spp=16, seed=i)
     ((image - target) ** 2).mean().backward()       # v.grad
 
-Imports torch, which `import limn` does not.
+Naming limn.torch imports torch, `import limn` does not.
 """
 
 from __future__ import annotations
