@@ -111,6 +111,19 @@ def test_the_camera_has_its_pose(scene):
     np.testing.assert_allclose(scene.sensor_to_world[:3, 3], pose[:3, 3] + [0, 1, 0])
 
 
+def test_the_selected_sensor_has_a_pose_by_its_id():
+    look = T().look_at
+    scene = limn.load_dict({
+        "type": "scene", "ball": {"type": "sphere"},
+        "left": {"type": "perspective", "to_world": look([-1, 0, 5], [0, 0, 0], [0, 1, 0])},
+        "right": {"type": "perspective", "to_world": look([1, 0, 5], [0, 0, 0], [0, 1, 0])}})
+    assert np.array_equal(scene["left.to_world"], scene.sensor_to_world)
+    assert "right.to_world" not in scene and ".to_world" not in scene
+    scene = scene.view("right")
+    scene["right.to_world"] = look([2, 0, 5], [0, 0, 0], [0, 1, 0])
+    np.testing.assert_allclose(scene["sensor.to_world"][:3, 3], [2, 0, 5])
+
+
 def test_follows_what_moves_a_shape(scene):
     before, first = scene["tent.vertex_positions"].copy(), T(scene["tent.to_world"])
     center = (before.min(axis=0) + before.max(axis=0)) / 2

@@ -230,7 +230,7 @@ void bind_parameters(nb::module_& m, nb::class_<SceneHandle>& scene) {
            nb::sig("def __getitem__(self, name: str) -> float | numpy.ndarray | None"),
            "The value of a parameter, see limn.Parameter.value. \"ID.to_world\" of shapes, delta "
            "lights and environment maps: (4, 4), float64, the to_world that a file would have for "
-           "where they are now; \"sensor.to_world\" is sensor_to_world.")
+           "where they are now; \"sensor.to_world\", or that of its id, is sensor_to_world.")
       .def(
           "__contains__",
           [](const SceneHandle& s, nb::handle name) {

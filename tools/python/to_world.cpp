@@ -39,7 +39,9 @@ std::optional<Object> find_object(const Scene& scene, const std::string& name) {
   if (scene.environment && scene.environment_id == id && scene.environment->grid()) {
     return Object{.environment = true};
   }
-  if (id == "sensor") return Object{.camera = true};
+  const bool selected =
+      scene.sensor < scene.sensors.size() && !id.empty() && scene.sensors[scene.sensor].id == id;
+  if (selected || id == "sensor") return Object{.camera = true};
   return std::nullopt;
 }
 
