@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "integrators/methods/method_table.h"
 #include "integrators/methods/move_rounding.h"
@@ -20,15 +21,12 @@ constexpr double kPilotShare = 0.1;  // of a run's time or samples; not tuned
 constexpr int kPilotSamples = 4;     // per pixel, at least: variances need some
 // The steps that the pilot tries: down from the natural one, which is for pictures that change a
 // lot. Not tuned.
-constexpr int kTrials = 5;
+constexpr int kTrials = kPilotImages / 2;
 constexpr double kFactor = 4;
 // The share of its way by which rounding may change what moves. Not tuned.
 constexpr double kMostRounding = 1.0 / 64;
 
-struct Step {
-  double value = 0;
-  std::string found_by;
-};
+using Step = DifferencePlan::Step;
 
 double mean_variance(const Moments& moments) { return mean_of(variances(moments)); }
 
@@ -72,9 +70,9 @@ std::vector<double> steps_to_try(const Scene& scene, const Parameter& parameter)
   return steps;
 }
 
-// Looks for a step for one parameter out of `parameters`, which share the time. seconds: of the
-// whole run, 0 if it has no limit.
-Step find_step(const Scene& scene, const Parameter& parameter, size_t parameters,
+// Looks for a step for one parameter out of `parameters`, which share the time, or the rays. Its
+// seconds are added to `seconds`.
+Step find_step(const Scene& scene, const Parameter& parameter, size_t parameters, double rays,
                const RunSettings& run, double& seconds) {
   RunSettings settings = run;
   settings.progress = nullptr;
@@ -88,11 +86,11 @@ Step find_step(const Scene& scene, const Parameter& parameter, size_t parameters
   settings.seed = run.seed + 1;  // not the samples that the run will take
   DifferenceJob job{parameter.name, steps_to_try(scene, parameter), {}};
   const size_t count = job.steps.size();
-  if (count < 2) return {resolved_step(scene, parameter), "what floats resolve"};
+  if (count < 2) return {{resolved_step(scene, parameter)}, "what floats resolve"};
   job.combinations = steps_and_changes(count);
   const CentralDifferences r = central_differences(scene, {job}, 0, settings, true);
   seconds += r.seconds;
-  if (r.spp < kPilotSamples) return {parameter.natural_step, "interrupted"};
+  if (r.spp < kPilotSamples) return {{parameter.natural_step}, "interrupted"};
   std::vector<StepTrial> trials;
   for (size_t k = 0; k < count; ++k) {
     const size_t next = count + std::max<size_t>(k, 1) - 1;
@@ -107,13 +105,19 @@ Step find_step(const Scene& scene, const Parameter& parameter, size_t parameters
   const double per_second =
       steps * static_cast<double>(r.spp) / std::max(r.seconds - r.setup_seconds, 1e-9);
   const double left = (run.seconds - r.setup_seconds / steps) / parameters - r.seconds;
-  const double samples =
+  double samples =
       run.seconds > 0 ? samples_behind_pilot(per_second, left, run.least_spp) : run.spp;
+  if (rays > 0) {
+    const double each = static_cast<double>(r.cost.rays) / (steps * static_cast<double>(r.spp));
+    samples =
+        std::max<double>(std::floor(rays / (each * static_cast<double>(parameters))), run.spp);
+  }
   return {
       best_step(trials, samples),
       fmt::format("a pilot of {} spp at {} steps from {:.3g} to {:.3g}: least sum of squared bias "
                   "and variance for a run of {:.3g} spp",
-                  r.spp, count, job.steps.front(), job.steps.back(), samples)};
+                  r.spp, count, job.steps.front(), job.steps.back(), samples),
+      samples};
 }
 
 void warn_of_rounding(const Scene& scene, const Parameter& parameter, double step,
@@ -139,25 +143,42 @@ ParameterGradient to_gradient(const std::string& name, DifferenceEstimate& estim
 
 }  // namespace
 
+DifferencePlan plan_differences(const Scene& scene, const GradientOptions& options,
+                                const RunSettings& settings, double rays) {
+  DifferencePlan plan;
+  const size_t parameters = options.parameters.size();
+  for (const std::string& name : options.parameters) {
+    plan.steps.push_back(options.step > 0 ? Step{{options.step}, "the user"}
+                                          : find_step(scene, find_parameter(scene, name),
+                                                      parameters, rays, settings, plan.seconds));
+  }
+  return plan;
+}
+
 GradientResult run_differences(const MethodType& method, const Scene& scene,
                                const GradientOptions& options, const RunSettings& settings) {
   const Stopwatch watch;
+  const DifferencePlan plan = plan_differences(scene, options, settings);
+  return run_planned(method.terms[0], scene, options, settings, plan, watch);
+}
+
+GradientResult run_planned(const std::string& term, const Scene& scene,
+                           const GradientOptions& options, const RunSettings& settings,
+                           const DifferencePlan& plan, const Stopwatch& watch) {
   std::vector<DifferenceJob> jobs;
   GradientResult result;
-  std::vector<Parameter> parameters;
-  for (const std::string& name : options.parameters) {
-    parameters.push_back(find_parameter(scene, name));
-  }
-  double pilot_seconds = 0;
-  for (const Parameter& parameter : parameters) {
-    const Step step = options.step > 0
-                          ? Step{options.step, "the user"}
-                          : find_step(scene, parameter, parameters.size(), settings, pilot_seconds);
-    jobs.push_back({parameter.name, {step.value}, {{1}}});
-    warn_of_rounding(scene, parameter, step.value, result.warnings);
-    const std::string of = parameters.size() > 1 ? " of " + parameter.name : "";
-    result.settings.push_back({"step" + of, step.value});
-    result.settings.push_back({"step" + of + " found by", step.found_by});
+  for (size_t k = 0; k < plan.steps.size(); ++k) {
+    const Parameter parameter = find_parameter(scene, options.parameters[k]);
+    const auto& [forecast, found_by, samples] = plan.steps[k];
+    jobs.push_back({parameter.name, {forecast.step}, {{1}}});
+    warn_of_rounding(scene, parameter, forecast.step, result.warnings);
+    const std::string of = plan.steps.size() > 1 ? " of " + parameter.name : "";
+    result.settings.push_back({"step" + of, forecast.step});
+    result.settings.push_back({"step" + of + " found by", found_by});
+    if (samples > 0) {
+      result.settings.push_back(
+          {"bias" + of + " (root mean square), at most", std::sqrt(forecast.most_squared_bias)});
+    }
   }
   RunSettings rest = settings;
   if (settings.seconds > 0) {
@@ -168,11 +189,11 @@ GradientResult run_differences(const MethodType& method, const Scene& scene,
     result.parameters.push_back(to_gradient(jobs[k].parameter, run.estimates[k][0]));
   }
   result.radiance = std::move(run.radiance);
-  result.terms = {{method.terms[0], true, true, 1, {}, run.cost}};
+  result.terms = {{term, true, true, 1, {}, run.cost}};
   result.spp = run.spp;
   result.seconds = watch.seconds();
-  result.setup_seconds = run.setup_seconds + pilot_seconds;
-  result.stats.setup = {{"pilot", pilot_seconds}, {"moved scenes", run.setup_seconds}};
+  result.setup_seconds = run.setup_seconds + plan.seconds;
+  result.stats.setup = {{"pilot", plan.seconds}, {"moved scenes", run.setup_seconds}};
   result.non_finite = std::move(run.non_finite);
   return result;
 }
@@ -194,18 +215,47 @@ void extrapolate_variances(std::span<StepTrial> trials) {
   }
 }
 
-double best_step(std::span<const StepTrial> trials, double samples) {
-  const double factor = trials[1].step / trials[0].step, square = factor * factor;
-  std::vector<double> biases, errors;  // squared
+namespace {
+
+// The squared bias at every step by its own change, less and with its standard error:
+// b (h^2 - (h / factor)^2) changes, b h^2 is the bias.
+struct OwnBiases {
+  std::vector<double> least, most;
+};
+OwnBiases own_biases(std::span<const StepTrial> trials, double square) {
+  OwnBiases own;
   for (size_t k = 0; k < trials.size(); ++k) {
-    // b (h^2 - (h / factor)^2) changes, b h^2 is the bias.
     const StepTrial& trial = trials[std::max<size_t>(k, 1)];
-    const double change = std::max(0.0, trial.squared_change) + trial.change_error;
+    const double change = std::max(0.0, trial.squared_change);
     const double scale = square / (square - 1) / (k == 0 ? square : 1);
-    biases.push_back(change * scale * scale);
+    own.least.push_back((change - trial.change_error) * scale * scale);
+    own.most.push_back((change + trial.change_error) * scale * scale);
   }
+  return own;
+}
+
+// The most that a step can be biased: no larger step's bias is smaller, and below the next trial
+// the squared bias falls with h at least.
+double most_squared_bias(std::span<const StepTrial> trials, const std::vector<double>& most,
+                         double step) {
+  double least = std::numeric_limits<double>::infinity();
+  for (size_t k = 0; k < trials.size(); ++k) {
+    if (trials[k].step < 0.999 * step) continue;
+    const bool next = least == std::numeric_limits<double>::infinity();
+    least = std::min(least, most[k] * (next ? step / trials[k].step : 1));
+  }
+  return least;
+}
+
+}  // namespace
+
+StepForecast best_step(std::span<const StepTrial> trials, double samples) {
+  const double factor = trials[1].step / trials[0].step, square = factor * factor;
+  const OwnBiases own = own_biases(trials, square);
+  std::vector<double> biases = own.most, errors;  // squared
   // Edges on the film that cross the borders of pixels within the step bias their derivatives as a
-  // whole: then the mean of the squares falls with h, and no slower; else with h^2 at least.
+  // whole: then the mean of the squares falls with h, and no slower; else with h^2 at least. Steps
+  // beyond what moves change the image no further: what a smaller one shows is there.
   const auto is_found = [&](size_t k) {
     return trials[k].squared_change > 2 * trials[k].change_error;
   };
@@ -213,20 +263,26 @@ double best_step(std::span<const StepTrial> trials, double samples) {
   for (size_t k = trials.size() - 1; k-- > 0;) {
     const double ratio = trials[k + 1].squared_change / trials[k].squared_change;
     if (k > 0 && is_found(k) && is_found(k + 1)) fall = std::clamp(ratio, factor, square);
-    biases[k] = std::min(biases[k], biases[k + 1] / fall);
+    const double fallen = biases[k + 1] / fall;
+    biases[k] = std::min(biases[k], k > 0 && is_found(k) ? std::max(fallen, own.least[k]) : fallen);
   }
   for (size_t k = 0; k < trials.size(); ++k)
     errors.push_back(biases[k] + trials[k].variance / std::max(1.0, samples));
   const auto least = std::min_element(errors.begin(), errors.end());
   const auto k = static_cast<size_t>(least - errors.begin());
-  if (k == 0 || k + 1 == trials.size()) return trials[k].step;
-  // With x the step over trial k's: minimum of bias x^4 + noise x^-power.
-  const double bias = biases[k] > 0 ? biases[k] : biases[k + 1] / (square * square);
   const double noise = errors[k] - biases[k];
+  // With x the step over trial k's: minimum of bias x^4 + noise x^-power.
+  const auto forecast_at = [&](double x, double power) {
+    const double step = x * trials[k].step;
+    return StepForecast{step, biases[k] * std::pow(x, 4), noise * std::pow(x, -power),
+                        most_squared_bias(trials, own.most, step)};
+  };
+  if (k == 0 || k + 1 == trials.size()) return forecast_at(1, 0);
+  const double bias = biases[k] > 0 ? biases[k] : biases[k + 1] / (square * square);
   const double power = std::log(trials[k - 1].variance / trials[k + 1].variance) / std::log(square);
-  if (!(bias > 0 && power > 0)) return trials[k].step;
+  if (!(bias > 0 && power > 0)) return forecast_at(1, 0);
   const double x = std::pow(power * noise / (4 * bias), 1 / (4 + power));
-  return std::clamp(x, 1 / factor, factor) * trials[k].step;
+  return forecast_at(std::clamp(x, 1 / factor, factor), power);
 }
 
 }  // namespace limn

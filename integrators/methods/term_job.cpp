@@ -93,7 +93,7 @@ class TermJob {
     passes_ = passes_at(moving_ ? std::optional(kPilotTime) : std::nullopt, settings.threads);
   }
 
-  GradientResult run(const RunSettings& settings, const Stopwatch& watch) {
+  GradientResult run(const RunSettings& settings, const Stopwatch& watch, const Rival& rival) {
     check_memory(passes_);
     GradientResult result = empty_result();
     const size_t warned = result.warnings.size();
@@ -104,6 +104,11 @@ class TermJob {
     result.at_kink = result.warnings.size() > warned;
     warn_of_views(result);
     plan(settings, watch, result);
+    if (rival && forecasts_ == passes_.size()) {
+      for (const auto& [part, seconds] : result.stats.setup)
+        if (part == "ray tracer") forecast_.tracer_seconds = seconds;
+      if (std::optional<GradientResult> other = rival(forecast_)) return std::move(*other);
+    }
     if (settings.store) identify_plan(result.terms, *settings.store);
     result.setup_seconds = watch.seconds();
     const EstimatorsAt at = [&](double u) {
@@ -541,22 +546,33 @@ class TermJob {
 
   // By what a pilot found. most: work of a sample of one pixel.
   void share_out(const TermEstimator& estimator, const Probed& probed, double most,
-                 SamplePlan& plan) const {
+                 SamplePlan& plan) {
     const auto& [pilot, fit, shared] = probed;
     std::vector<double> units;
     const std::vector<TermFigures> figures = figures_of(estimator, probed, units);
-    double price;
+    PlanTotals totals;
     if (method_.spreads_samples && !options_.uniform_samples) {
-      price = spread_samples(figures, pilot.grid, plan, most);
+      totals = spread_samples(figures, pilot.grid, plan, most, method_.or_differences);
     } else {
       plan.uniform = best_samples(figures, most);
-      price = price_of(figures, plan.uniform);
+      totals = totals_of(figures, plan.uniform);
     }
+    add_forecast(pilot, units, totals);
     for (double& unit : units) unit /= shared;  // of single samples
     if (method_.spreads_samples || method_.random_directions)
-      plan.survival = survival_of(pilot.traced, price, units);
+      plan.survival = survival_of(pilot.traced, totals.price(), units);
     plan.grid = pilot.grid;
     plan.fields = fit.fields;
+  }
+
+  void add_forecast(const PilotFigures& pilot, const std::vector<double>& units,
+                    const PlanTotals& totals) {
+    ++forecasts_;
+    forecast_.units.insert(forecast_.units.end(), units.begin(), units.end());
+    forecast_.error += totals.expected;
+    forecast_.work += totals.cost;
+    forecast_.seconds +=
+        totals.cost * pilot.seconds_of_work * static_cast<double>(film_size(scene_.film)) / 3;
   }
 
   const Scene& scene_;
@@ -573,14 +589,17 @@ class TermJob {
   std::optional<Scene> start_;           // of scenes that move: the scene, with known overlaps
   std::vector<KeptEdges> kept_;          // the same, of each pass
   std::vector<std::unique_ptr<SampleEstimator>> passes_;
+  TermForecast forecast_;
+  size_t forecasts_ = 0;  // passes that are in it
 };
 
 }  // namespace
 
 GradientResult run_terms(const TermMethod& method, const Scene& scene,
-                         const GradientOptions& options, const RunSettings& settings) {
+                         const GradientOptions& options, const RunSettings& settings,
+                         const Rival& rival) {
   const Stopwatch watch;
-  return TermJob(scene, options, method, settings).run(settings, watch);
+  return TermJob(scene, options, method, settings).run(settings, watch, rival);
 }
 
 std::vector<std::string> trace_terms(const TermMethod& method, const Scene& scene,

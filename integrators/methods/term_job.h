@@ -1,5 +1,7 @@
 #pragma once
 // A whole run of one method that works term by term.
+#include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,10 +22,29 @@ struct TermMethod {
   bool unbiased = false;           // the same without the bias of few rays
   bool closed = false;  // light that is scattered once in closed form, see closed_light.h
   Numbers numbers = Numbers::kIndependent;
+  bool or_differences = false;  // where pilots expect less error of them
 };
 
+// What pilots expect of a run.
+struct TermForecast {
+  // Of each parameter, summed over channels: the variance of one sample of every term.
+  std::vector<double> units;
+  // Of one sample of a pixel: the squared error over these units, summed over parameters; work as
+  // Term::work counts it; seconds that all pixels take.
+  double error = 0, work = 0, seconds = 0;
+  double tracer_seconds = 0;  // that a ray tracer took to build
+};
+// Asked behind the pilots of a run, where there was time for them: whether another method does the
+// rest. It may not use the samples that the run would take, or its choice would bias them.
+using Rival = std::function<std::optional<GradientResult>(const TermForecast&)>;
+
 GradientResult run_terms(const TermMethod& method, const Scene& scene,
-                         const GradientOptions& options, const RunSettings& settings);
+                         const GradientOptions& options, const RunSettings& settings,
+                         const Rival& rival = {});
+
+// With differences for a rival.
+GradientResult run_fastest(const TermMethod& method, const Scene& scene,
+                           const GradientOptions& options, const RunSettings& settings);
 
 // What one sample of a run meets, line by line.
 std::vector<std::string> trace_terms(const TermMethod& method, const Scene& scene,

@@ -71,15 +71,16 @@ void set_up(MethodType& row, const TermMethod& given) {
       row.terms.emplace_back(type.name);
     }
   }
-  row.terms_can_be_left_out = true;
+  row.terms_can_be_left_out = !method.or_differences;
   row.only_sum_fixed = method.moves_directions || method.random_directions || method.moves_film ||
                        method.warps || method.closed;
   row.closed_light = method.closed;
   row.warps = method.warps;
-  row.biased = method.warps && !method.unbiased;
+  row.biased = (method.warps && !method.unbiased) || method.or_differences;
   row.run = [method](const MethodType&, const Scene& scene, const GradientOptions& options,
                      const RunSettings& settings) {
     if (options.points == FilmPoints::kFaces) return run_faces(scene, options, settings);
+    if (method.or_differences) return run_fastest(method, scene, options, settings);
     return run_terms(method, scene, options, settings);
   };
   row.trace = [method](const MethodType&, const Scene& scene, const GradientOptions& options,
@@ -118,6 +119,10 @@ std::vector<MethodType> term_methods() {
     if (!to.is_variant())
       to.reverse = ReverseMethod{.sampler = edge_sampler_type("silhouettes"), .chooses = true};
   };
+  methods.push_back(method_row("fastest",
+                               "adaptive, or fd where pilots expect less squared error of it after "
+                               "equal time; that is biased, as the output says",
+                               "silhouettes", {.or_differences = true}, motion_settings(true)));
   for (const EdgeSamplerType& type : edge_sampler_types()) {
     const bool lists = type.regions;
     methods.push_back(method_row(type.name, type.description, type.name, {},

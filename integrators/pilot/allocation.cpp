@@ -44,9 +44,23 @@ void raise_to_least_share(std::vector<double>& counts) {
   for (double& count : counts) count = std::max(count, kLeastShare * mean);
 }
 
+// Of windows without the cell in their middle.
+std::vector<double> means_around(const PlanGrid& grid, const std::vector<double>& values,
+                                 int radius) {
+  std::vector<double> means = window_means(grid, values, radius);
+  for (size_t i = 0; i < means.size(); ++i) {
+    const int x = static_cast<int>(i) % grid.columns, y = static_cast<int>(i) / grid.columns;
+    const int columns = std::min(grid.columns - 1, x + radius) - std::max(0, x - radius) + 1;
+    const int rows = std::min(grid.rows - 1, y + radius) - std::max(0, y - radius) + 1;
+    const int count = columns * rows;
+    if (count > 1) means[i] = (means[i] * count - values[i]) / (count - 1);
+  }
+  return means;
+}
+
 // Each is where one more sample is worth its work: v (1 - kept) power / n^(power + 1) = price c.
-// The scale is price^(-1/2).
-Wish wish_of(const TermFigures& term, const PlanGrid& grid) {
+// The scale is price^(-1/2). around: by the cells around each.
+Wish wish_of(const TermFigures& term, const PlanGrid& grid, bool around = false) {
   Wish wish;
   if (term.cells.empty()) return wish;
   wish.variance.assign(grid.size(), 0);
@@ -57,7 +71,8 @@ Wish wish_of(const TermFigures& term, const PlanGrid& grid) {
   if (!(term.variance > 0)) return wish;
   const auto smooth = [&](const std::vector<double>& values, std::vector<double>& to) {
     for (const int radius : kSpreadRadii) {
-      const std::vector<double> means = window_means(grid, values, radius);
+      const std::vector<double> means =
+          around ? means_around(grid, values, radius) : window_means(grid, values, radius);
       for (size_t i = 0; i < grid.size(); ++i)
         to[i] += std::max(means[i], 0.0) / std::size(kSpreadRadii);
     }
@@ -90,21 +105,16 @@ double possible(const TermFigures& term, const Wish& wish, size_t cell, double s
   return std::clamp(std::round(count_at(term, wish.cells[cell], scale)), 1.0, double{kMostInPixel});
 }
 
-struct Totals {
-  double error = 0, cost = 0;
-  double product() const { return error * cost; }
-};
-
 // Counts at one scale: those of terms of the film for the least product there.
 struct ScaledPlan {
-  Totals totals;
+  PlanTotals totals;
   std::vector<double> film;  // of each term; 0 of the others
 };
 
 // Of the terms of cells, with all wishes multiplied by `scale`.
-Totals totals_of_cells(const std::vector<TermFigures>& terms, const std::vector<Wish>& wishes,
-                       double scale) {
-  Totals totals;
+PlanTotals totals_of_cells(const std::vector<TermFigures>& terms, const std::vector<Wish>& wishes,
+                           double scale) {
+  PlanTotals totals;
   for (size_t t = 0; t < terms.size(); ++t) {
     const double each = 1.0 / static_cast<double>(wishes[t].cells.size());
     for (size_t i = 0; i < wishes[t].cells.size(); ++i) {
@@ -119,7 +129,7 @@ Totals totals_of_cells(const std::vector<TermFigures>& terms, const std::vector<
 // The count of a term of the film beside `others`: the smallest whose product is that close to the
 // least, or the largest that costs no more than is left of `most`; the fewest if none is
 // that cheap.
-double best_on_film(const TermFigures& term, const Totals& others, double most) {
+double best_on_film(const TermFigures& term, const PlanTotals& others, double most) {
   if (!(term.variance > 0)) return term.least;
   constexpr double kStep = 1.189207115002721;  // the fourth root of 2
   const auto cost = [&](double n) { return others.cost + term.cost_of(n); };
@@ -134,7 +144,7 @@ double best_on_film(const TermFigures& term, const Totals& others, double most) 
 ScaledPlan plan_at(const std::vector<TermFigures>& terms, const std::vector<Wish>& wishes,
                    double scale, double most) {
   ScaledPlan plan{totals_of_cells(terms, wishes, scale), std::vector<double>(terms.size())};
-  Totals& sum = plan.totals;
+  PlanTotals& sum = plan.totals;
   const auto add = [&](size_t t, double sign) {
     sum.error += sign * terms[t].left_by(plan.film[t]);
     sum.cost += sign * terms[t].cost_of(plan.film[t]);
@@ -253,12 +263,35 @@ SampleCounts best_samples(const std::vector<TermFigures>& figures, double most) 
   return least > 0 ? SampleCounts(best) : SampleCounts();
 }
 
-double spread_samples(const std::vector<TermFigures>& figures, const PlanGrid& grid,
-                      SamplePlan& plan, double most) {
+namespace {
+
+// The error of a plan by its scale, where each cell's count is that which the cells around it wish
+// for: its own figures tell what that leaves.
+double error_beyond(const std::vector<TermFigures>& figures, const PlanGrid& grid,
+                    const ScaledPlan& plan, double scale) {
+  double error = 0;
+  std::vector<double> cells(grid.size());
+  for (size_t t = 0; t < figures.size(); ++t) {
+    const TermFigures& term = figures[t];
+    const Wish wish = wish_of(term, grid, true);
+    if (wish.cells.empty()) error += term.left_by(plan.film[t]);
+    for (size_t i = 0; i < wish.cells.size(); ++i) {
+      const double squared = term.cells_squared.empty() ? 0 : term.cells_squared[i];
+      cells[i] += term.left_by(possible(term, wish, i, scale), term.cells[i], squared);
+    }
+  }
+  error += trimmed_mean(cells);
+  return error;
+}
+
+}  // namespace
+
+PlanTotals spread_samples(const std::vector<TermFigures>& figures, const PlanGrid& grid,
+                          SamplePlan& plan, double most, bool expect) {
   std::vector<Wish> wishes;
   for (const TermFigures& term : figures) wishes.push_back(wish_of(term, grid));
   const auto varies = [](const TermFigures& term) { return term.variance > 0 && term.cost > 0; };
-  if (std::none_of(figures.begin(), figures.end(), varies)) return 0;
+  if (std::none_of(figures.begin(), figures.end(), varies)) return {};
   const double scale = fitting_scale(figures, wishes, best_scale(figures, wishes), most);
   const ScaledPlan scaled = plan_at(figures, wishes, scale, most);
   plan.grid = grid;
@@ -277,25 +310,19 @@ double spread_samples(const std::vector<TermFigures>& figures, const PlanGrid& g
     means.push_back(sum / static_cast<double>(grid.size()));
   }
   plan.uniform = SampleCounts(means);
-  return scaled.totals.error / scaled.totals.cost;
+  PlanTotals totals = scaled.totals;
+  totals.expected = expect ? error_beyond(figures, grid, scaled, scale) : totals.error;
+  return totals;
 }
 
-namespace {
-
-Totals totals_of(const std::vector<TermFigures>& figures, const SampleCounts& counts) {
-  Totals totals;
+PlanTotals totals_of(const std::vector<TermFigures>& figures, const SampleCounts& counts) {
+  PlanTotals totals;
   for (size_t t = 0; t < figures.size(); ++t) {
     totals.error += figures[t].left_by(counts[t]);
     totals.cost += figures[t].cost_of(counts[t]);
   }
+  totals.expected = totals.error;
   return totals;
-}
-
-}  // namespace
-
-double price_of(const std::vector<TermFigures>& figures, const SampleCounts& counts) {
-  const Totals totals = totals_of(figures, counts);
-  return totals.cost > 0 ? totals.error / totals.cost : 0;
 }
 
 double least_error_times_cost(const std::vector<TermFigures>& figures) {

@@ -50,6 +50,18 @@ struct TermFigures {
   }
 };
 
+// What a plan leaves and what it costs, of one sample of a pixel.
+struct PlanTotals {
+  double error = 0, cost = 0;
+  // The error that other samples than the pilot's are expected to have: the plan gives more where
+  // the pilot's are large, by chance too.
+  double expected = 0;
+  double product() const { return error * cost; }
+  // Of work, the Lagrange multiplier of the plan: how much of the squared error a unit of work is
+  // worth in it; 0 if there is none.
+  double price() const { return cost > 0 ? error / cost : 0; }
+};
+
 // After equal time, the squared error goes with (sum of variance / samples) times (sum of cost *
 // samples). Its minimum is at samples ~ sqrt(variance / cost); this is the best of the small counts
 // in use: at most eight, so that a pilot that saw too little of a term starves it no further.
@@ -64,14 +76,12 @@ double least_error_times_cost(const std::vector<TermFigures>& figures);
 // deviation there; a pilot sees that too rarely in one cell, so the variance is the mean of those
 // over 5 by 5 and 9 by 9 cells, and a share is a quarter of the mean at least. Counts are whole;
 // they are as small as rounding allows.
-// The result is the price of work, the Lagrange multiplier of the plan: how much of the squared
-// error a unit of work is worth in it, 0 if there is none. most: see best_samples; the mean over
-// cells.
-double spread_samples(const std::vector<TermFigures>& figures, const PlanGrid& grid,
-                      SamplePlan& plan, double most = kNoLimit);
+// most: see best_samples; the mean over cells. expect: whether to find PlanTotals::expected.
+PlanTotals spread_samples(const std::vector<TermFigures>& figures, const PlanGrid& grid,
+                          SamplePlan& plan, double most = kNoLimit, bool expect = false);
 
 // The same where all pixels have these counts.
-double price_of(const std::vector<TermFigures>& figures, const SampleCounts& counts);
+PlanTotals totals_of(const std::vector<TermFigures>& figures, const SampleCounts& counts);
 
 // See SamplePlan. A draw of weight w and radiance difference d adds (w d)^2 to the squared error.
 // Traced with the probability p it adds (w d)^2 / p, for p of its rays' work: p = w d / sqrt(price

@@ -4,6 +4,7 @@
 
 #include "integrators/pilot/allocation.h"
 #include "limn/core/error.h"
+#include "limn/core/rng.h"
 #include "limn/integrators/check.h"
 #include "support/meshes.h"
 #include "support/scenes.h"
@@ -142,6 +143,22 @@ TEST(SpreadSamples, GoWithTheDeviation) {
   EXPECT_DOUBLE_EQ(plan.uniform[0], sum / static_cast<double>(grid.size()));
 }
 
+// One cell in twenty met a large sample by chance. The plan gives more samples there and looks
+// good by what it has seen; other samples are as large anywhere.
+TEST(SpreadSamples, ExpectNoMoreThanOtherSamplesShow) {
+  PlanGrid grid;
+  grid.columns = grid.rows = 100;
+  TermFigures term{1, 1, 1, std::vector<double>(grid.size(), 0.0)};
+  Rng rng(1, 2, 3);
+  for (double& cell : term.cells) cell = rng.uniform() < 0.05 ? 20 : 0;
+  SamplePlan plan;
+  const PlanTotals totals = spread_samples({term}, grid, plan, kNoLimit, true);
+  double error = 0;
+  for (const PixelCounts& counts : plan.counts) error += 1 / (counts[0] * grid.size());
+  EXPECT_LT(totals.error, 0.8 * error);
+  EXPECT_NEAR(totals.expected, error, 0.15 * error);
+}
+
 // What the first sample of a vertex finds, further ones need not: from one on they are cheap, and
 // fewer than one save all of it.
 TEST(SpreadSamples, KnowWhatFurtherOnesCost) {
@@ -152,7 +169,7 @@ TEST(SpreadSamples, KnowWhatFurtherOnesCost) {
     const std::vector<TermFigures> figures = {{1, 3, 1, cells(1)},
                                               {variance, 10, 0.125, cells(variance), 8}};
     SamplePlan plan;
-    const double price = spread_samples(figures, grid, plan);
+    const double price = spread_samples(figures, grid, plan).price();
     const auto totals = [&](double a, double b) {
       const double shared = b > 1 ? 8 * (b - 1) : 0;
       return std::array{1 / a + variance / b, 3 * a + 10 * b - shared};

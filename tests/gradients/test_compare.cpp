@@ -297,20 +297,25 @@ TEST(Differences, BestStepIsTheMinimum) {
       const double bias = 10, samples = 100;
       // The derivative of B h^4 + V h^-power / n is zero there.
       const double variance = 4 * bias * samples / power * std::pow(optimum, 4 + power);
-      EXPECT_NEAR(best_step(trials_of(bias, variance, power), samples), optimum, 1e-9 * optimum);
+      const StepForecast found = best_step(trials_of(bias, variance, power), samples);
+      EXPECT_NEAR(found.step, optimum, 1e-9 * optimum);
+      const double squared_bias = bias * std::pow(optimum, 4);
+      EXPECT_NEAR(found.squared_bias, squared_bias, 1e-9 * squared_bias);
+      EXPECT_NEAR(found.variance, 4 / power * squared_bias, 1e-9 * squared_bias);
+      EXPECT_GE(found.most_squared_bias, found.squared_bias);
     }
   }
   // Without bias the largest step, without noise the smallest.
-  EXPECT_DOUBLE_EQ(best_step(trials_of(0, 1, 1), 100), 0.256);
-  EXPECT_DOUBLE_EQ(best_step(trials_of(1, 0, 1), 100), 0.001);
+  EXPECT_DOUBLE_EQ(best_step(trials_of(0, 1, 1), 100).step, 0.256);
+  EXPECT_DOUBLE_EQ(best_step(trials_of(1, 0, 1), 100).step, 0.001);
   // Noise that does not fall with the step: as small as the bias needs it, whatever is far away.
   std::vector<StepTrial> trials = trials_of(10, 1, 0);
-  EXPECT_LT(best_step(trials, 100), 0.256);
+  EXPECT_LT(best_step(trials, 100).step, 0.256);
   // A squared bias that the pilot cannot tell from none may be there, and is less at smaller steps:
   // 0.0228 beside an error of 0.0039 at the largest, 0.0014 beside 0.0156 at the next.
   trials = trials_of(0, 0.1, 1);
   for (StepTrial& trial : trials) trial.change_error = 0.02;
-  EXPECT_NEAR(best_step(trials, 100), 0.064 * std::pow(0.015625 / (4 * 0.0014222), 0.2), 1e-5);
+  EXPECT_NEAR(best_step(trials, 100).step, 0.064 * std::pow(0.015625 / (4 * 0.0014222), 0.2), 1e-5);
 }
 
 // Edges along the columns of pixels: those within a step of a border have a bias of their own size,
@@ -322,8 +327,18 @@ TEST(Differences, BestStepKnowsEdgesAtTheBordersOfPixels) {
     trials.push_back({h, 1 / h, 100 * h});
   }
   // 100 h + 1 / (10^4 h) is least at h = 0.001.
-  const double step = best_step(trials, 1e4);
+  const double step = best_step(trials, 1e4).step;
   EXPECT_LE(100 * step + 1e-4 / step, 1.5 * (100 * 0.001 + 1e-4 / 0.001));
+}
+
+// A step so large that all has moved away changes no further: what the next one shows is no less.
+TEST(Differences, BestStepKnowsStepsBeyondWhatMoves) {
+  const std::vector<StepTrial> trials = {{0.00067, 1850, -1, 3.1},
+                                         {0.0027, 145, -1, 3.1},
+                                         {0.0106, 11.4, 0.63, 1.03},
+                                         {0.0426, 0.9, 0.68, 0.15},
+                                         {0.17, 0.07, 0.28, 0.027}};
+  EXPECT_LT(best_step(trials, 620).step, 0.0106);
 }
 
 TEST(Differences, APilotThatTookAllTheTimeLeavesTheFewestSamples) {

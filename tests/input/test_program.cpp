@@ -286,6 +286,23 @@ TEST_F(Program, GradientsByAnyMethod) {
             std::string::npos);
 }
 
+// On the terminal and in the files.
+TEST_F(Program, FastestSaysWhatItChose) {
+  const Outcome outcome = run("gradient " + scene_ + " --wrt screen.translate.x --spp 16 " +
+                              "--method fastest --json " + files_.path("g.json") + " -o " + out());
+  EXPECT_EQ(outcome.status, 0) << outcome.text;
+  EXPECT_NE(outcome.text.find("\nchosen: "), std::string::npos) << outcome.text;
+  std::ifstream stream(files_.path("g.json"));
+  const auto figures = nlohmann::json::parse(stream);
+  EXPECT_EQ(figures["method"], "fastest");
+  const std::string chosen = figures["settings"]["chosen"];
+  EXPECT_EQ(chosen == "fd (biased)",
+            outcome.text.find("is biased, as a root mean square") != std::string::npos);
+  std::ifstream image(files_.path("out.exr"), std::ios::binary);
+  const std::string bytes{std::istreambuf_iterator<char>(image), {}};
+  EXPECT_NE(bytes.find(chosen), std::string::npos);
+}
+
 TEST_F(Program, ChecksAnyMethod) {
   for (const std::string method : {"li2019", "fd"}) {
     const Outcome outcome = run("check " + scene_ + " --spp 512 --block 2 --method " + method +
