@@ -203,6 +203,27 @@ def test_views_cannot_be_written_and_stay_as_they_were(folder, scene):
         mesh.positions = kept
 
 
+@pytest.mark.parametrize("name, change", [
+    ("tent.vertex_positions", [0, 0.125, 0]), ("clay.reflectance", 0.125),
+    ("ball.to_world", np.eye(4, k=3) / 2)])
+def test_arrays_change_in_place_by_assignment(scene, name, change):
+    start = np.array(scene[name])
+    scene[name] += change
+    np.testing.assert_allclose(scene[name], start + change, atol=1e-6)
+    scene[name] -= change
+    scene[name] *= 1
+    scene[name] /= 1
+    np.testing.assert_allclose(scene[name], start, atol=1e-6)
+    with pytest.raises(ValueError, match="read-only"):
+        scene[name][0] = 0
+    with pytest.raises(ValueError, match="read-only"):
+        scene[name][1:] += 1
+    own = scene[name].copy()
+    part = own[:1]
+    part += 1
+    assert np.array_equal(own[:1], part)
+
+
 # Setting positions is reading the mesh with them; nothing else of the scene is touched.
 def test_positions_make_what_a_file_with_them_makes(folder, scene):
     moved = scene["tent.vertex_positions"] + np.float32([0.3, 0.1, -0.2])

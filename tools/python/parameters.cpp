@@ -39,15 +39,23 @@ std::optional<ShapeId> shape_of(const ParameterView& view) {
   return find_shape(*view.scene, name.substr(0, name.rfind('.')));
 }
 
+// The same memory as limn.arrays.Array, which cannot be written.
+nb::object locked(const nb::object& array) {
+  nb::object view = array.attr("view")(nb::module_::import_("limn.arrays").attr("Array"));
+  view.attr("setflags")(nb::arg("write") = false);
+  return view;
+}
+
 nb::object value_of(const ParameterView& view) {
   if (view.moved) return nb::cast(*view.moved);
-  if (const auto shape = shape_of(view)) return nb::cast(view_positions(view.scene, *shape));
+  if (const auto shape = shape_of(view))
+    return locked(nb::cast(view_positions(view.scene, *shape)));
   if (view.parameter.array.size() == 3) {
-    return nb::cast(to_array(view.parameter.texel_map(*view.scene)->texels()));
+    return locked(nb::cast(to_array(view.parameter.texel_map(*view.scene)->texels())));
   }
   const std::vector<double> value = view.parameter.value(*view.scene);
   if (value.empty()) return nb::none();
-  return value.size() == 1 ? nb::cast(value[0]) : as_array(nb::cast(value), "float64");
+  return value.size() == 1 ? nb::cast(value[0]) : locked(as_array(nb::cast(value), "float64"));
 }
 
 nb::tuple shape_tuple(const ParameterView& view) {
@@ -58,11 +66,12 @@ std::string shape_text(const std::vector<size_t>& shape) {
   return fmt::format("({}{})", fmt::join(shape, ", "), shape.size() == 1 ? "," : "");
 }
 
-// A colour may be one number, of all channels.
+// A colour may be one number, of all channels; an attribute (1, N, 3) may be (N, 3).
 void check_shape(const ParameterView& view, const nb::ndarray<const double, nb::c_contig>& value) {
   const std::vector<size_t>& shape = view.parameter.array;
   std::vector<size_t> given;
   for (size_t k = 0; k < value.ndim(); ++k) given.push_back(value.shape(k));
+  if (given.size() == 2 && shape.size() == 3 && shape[0] == 1) given.insert(given.begin(), 1);
   if (shape.empty() || given == shape) return;
   throw InputError({view.scene->file},
                    fmt::format("parameter \"{}\" has shape {}, not {}", view.parameter.name,
@@ -77,7 +86,7 @@ std::string object_of(const std::string& name) {
 
 nb::object get(const SceneHandle& scene, const std::string& name) {
   if (!names_place(scene.get(), name)) return value_of(find(scene, name));
-  return to_array(to_world(scene.get(), scene.history, name));
+  return locked(to_array(to_world(scene.get(), scene.history, name)));
 }
 
 void set_place(SceneHandle& scene, const std::string& name, nb::handle value) {
@@ -164,8 +173,8 @@ void bind_parameter(nb::module_& m) {
           "natural_step", [](const ParameterView& v) { return v.parameter.natural_step; },
           "A small step: about a hundredth of what changes the picture a lot.")
       .def_prop_ro("value", value_of, nb::sig("def value(self) -> float | numpy.ndarray | None"),
-                   "The value: a number, float64 (3,) of a colour, or float32 (V, 3), a view that "
-                   "cannot be written; a float32 (H, W, 3) copy of texels. Of a translation how "
+                   "The value: a number, or an array that cannot be written: float64 (3,) of a "
+                   "colour, float32 (V, 3), float32 (H, W, 3) of texels. Of a translation how "
                    "far it has been moved since the scene was read. None of rotations and scales "
                    "(Scene.move).")
       .def("__repr__", repr);
@@ -228,7 +237,8 @@ void bind_parameters(nb::module_& m, nb::class_<SceneHandle>& scene) {
           "listed.")
       .def("__getitem__", get, nb::arg("name"),
            nb::sig("def __getitem__(self, name: str) -> float | numpy.ndarray | None"),
-           "The value of a parameter, see limn.Parameter.value. \"ID.to_world\" of shapes, delta "
+           "The value of a parameter, see limn.Parameter.value. Arrays cannot be written: "
+           "scene[name] += x sets all of it. \"ID.to_world\" of shapes, delta "
            "lights and environment maps: (4, 4), float64, the to_world that a file would have for "
            "where they are now; \"sensor.to_world\", or that of its id, is sensor_to_world.")
       .def(
