@@ -32,11 +32,14 @@ std::optional<Parameter> find_own(const std::vector<Parameter>& list, const Scen
 std::optional<Parameter> find_nested(const std::vector<Parameter>& list, const Scene& scene,
                                      const std::string& name) {
   if (auto found = find_own(list, scene, name)) return found;
-  constexpr std::pair<std::string_view, std::string_view> kParts[] = {
-      {".nested_bsdf.", "."}, {".brdf_0.", "."}, {".brdf_0.", ".front."}, {".brdf_1.", ".back."}};
+  constexpr std::pair<std::string_view, std::string_view> kParts[] = {{".nested_bsdf.", "."},
+                                                                      {".brdf_0.", "."},
+                                                                      {".brdf_0.", ".front."},
+                                                                      {".brdf_1.", ".back."},
+                                                                      {".x_fov", ".fov"}};
   for (const auto& [mitsuba, own] : kParts) {
     const size_t at = name.find(mitsuba);
-    if (at == std::string::npos) continue;
+    if (at == std::string::npos || (own == ".fov" && scene.camera.x_factor != 1)) continue;
     const std::string here = std::string(name).replace(at, mitsuba.size(), own);
     if (auto found = find_nested(list, scene, here)) return found;
   }
@@ -47,8 +50,11 @@ std::optional<Parameter> find_nested(const std::vector<Parameter>& list, const S
                                const std::vector<Parameter>& list) {
   std::vector<std::string> names;
   for (const Parameter& p : list) names.push_back(p.name);
-  throw UnknownParameter({scene.file}, "unknown parameter \"" + name + "\" (nearest: " +
-                                           join(nearest_names(name, names, 5)) + ")");
+  std::string advice = "nearest: " + join(nearest_names(name, names, 5));
+  if (name.ends_with(".positions")) advice = "they are called vertex_positions";
+  if (name.ends_with(".x_fov")) advice = "sensor.fov is along the file's fov_axis, which is not x";
+  if (name.ends_with(".faces")) advice = "see mesh() and set_mesh() in Python";
+  throw UnknownParameter({scene.file}, "unknown parameter \"" + name + "\" (" + advice + ")");
 }
 
 // Whether a texture in use is discontinuous where no edge is known: then nothing may move. Those of

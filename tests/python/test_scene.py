@@ -224,6 +224,37 @@ def test_arrays_change_in_place_by_assignment(scene, name, change):
     assert np.array_equal(own[:1], part)
 
 
+def test_names_of_mitsuba_that_are_called_otherwise(scene):
+    scene["sensor.x_fov"] = 42
+    assert scene["sensor.fov"] == 42 and "sensor.x_fov" not in list(scene)
+    slopes = limn.gradient(scene, ["sensor.x_fov", "sensor.fov"], spp=2)
+    assert same(slopes["sensor.x_fov"].value, slopes["sensor.fov"].value)
+    other = limn.load_dict({"type": "scene", "eye": {"type": "perspective", "fov_axis": "y", "fov": 40,
+                            "film": {"type": "hdrfilm", "width": 8, "height": 4}}})
+    with pytest.raises(KeyError, match="sensor.fov is along the file's fov_axis, which is not x"):
+        other["sensor.x_fov"]
+    for name, advice in (("tent.positions", "called vertex_positions"), ("tent.faces", r"set_mesh\(\)")):
+        with pytest.raises(limn.UnknownParameterError, match=advice):
+            scene[name]
+    with pytest.raises(AttributeError, match="limn.load reads files"):
+        limn.load_file
+
+
+@pytest.mark.parametrize("call, text", [
+    (lambda s: limn.render(s, seed=-1), r"seed must be int \| None, not -1: from 0 on$"),
+    (lambda s: limn.render(s, spp=2**70), r"spp must be int \| None, not \d+$"),
+    (lambda s: limn.render(s, integrator="path"), r'the scene has it, as "integrator": '),
+    (lambda s: limn.render(s, sensor=1), r"'sensor' \(use scene.view\(sensor\)\)$"),
+    (lambda s: limn.render(s, thread=1), r"no argument 'thread' \(nearest: threads, "),
+    (lambda s: limn.Fit(s, 0, "clay.reflectance", lr=0.05), r"use step, in natural steps: step=5 is"),
+    (lambda s: limn.fit(s, 0, "clay.reflectance", learning_rate=1), "use step, in natural steps"),
+])
+def test_arguments_that_are_none(scene, call, text):
+    with pytest.raises(TypeError, match=text) as error:
+        call(scene)
+    assert len(str(error.value)) < 150
+
+
 # Setting positions is reading the mesh with them; nothing else of the scene is touched.
 def test_positions_make_what_a_file_with_them_makes(folder, scene):
     moved = scene["tent.vertex_positions"] + np.float32([0.3, 0.1, -0.2])

@@ -15,6 +15,17 @@ namespace {
 
 std::string quoted(const std::string& word) { return "'" + word + "'"; }
 
+// What to write in place of arguments that other programs have; "" of others.
+std::string advice_on_argument(const std::string& name, const std::vector<std::string>& known) {
+  if (name == "sensor") return "use scene.view(sensor)";
+  if (name == "integrator") {
+    return "the scene has it, as \"integrator\": {\"type\": \"path\", \"max_depth\": 8}";
+  }
+  const bool steps = std::find(known.begin(), known.end(), "step") != known.end();
+  if (!steps || (name != "lr" && name != "learning_rate")) return "";
+  return "use step, in natural steps: step=5 is about 5 % of a value";
+}
+
 }  // namespace
 
 void Arguments::add_row(const Option& option, const char* type, std::string standard,
@@ -85,9 +96,14 @@ void Arguments::set(Argument& argument, nb::handle value) const {
   try {
     argument.set(value);
   } catch (const nb::cast_error&) {
-    throw nb::type_error(fmt::format("{}(): {} must be {}, not {}", function_, argument.name,
-                                     argument.type, nb::type_name(value.type()).c_str())
-                             .c_str());
+    std::string wrong = nb::type_name(value.type()).c_str();
+    if (wrong == "int" && argument.type.starts_with("int")) {
+      wrong = nb::cast<std::string>(nb::str(value));
+      if (wrong.starts_with("-")) wrong += ": from 0 on";
+    }
+    throw nb::type_error(
+        fmt::format("{}(): {} must be {}, not {}", function_, argument.name, argument.type, wrong)
+            .c_str());
   }
 }
 
@@ -103,10 +119,14 @@ void Arguments::read(const nb::args& positional, const nb::kwargs& named) {
     const auto found =
         std::find_if(list_.begin(), list_.end(), [&](const Argument& a) { return a.name == name; });
     if (found == list_.end()) {
-      const char* advice = name == "sensor" ? " (use scene.view(sensor))" : "";
+      std::vector<std::string> known;
+      for (const Argument& a : list_) {
+        if (!a.hidden) known.push_back(a.name);
+      }
+      std::string advice = advice_on_argument(name, known);
+      if (advice.empty()) advice = "nearest: " + join(nearest_names(name, known, 3));
       throw nb::type_error(
-          fmt::format("{}() has no argument '{}'{}: it takes {}", function_, name, advice, list())
-              .c_str());
+          fmt::format("{}() has no argument '{}' ({})", function_, name, advice).c_str());
     }
     set(*found, value);
   }

@@ -119,4 +119,6 @@ if not _TYPE_CHECKING:
     def __getattr__(name: str) -> object:
         if name in ("jax", "torch"):
             return _import_module(f"{__name__}.{name}")
+        if name == "load_file":
+            raise AttributeError("limn has no load_file: limn.load reads files")
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
