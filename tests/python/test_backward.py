@@ -205,6 +205,8 @@ def test_torch_refuses_arrays_without_a_value_and_second_derivatives(scene):
     torch, bridge = torch_and_bridge()
     with pytest.raises(limn.InputError, match="has no value to give"):
         bridge.render(scene, {"tent.displacement": torch.tensor(0.1)})
+    with pytest.raises(limn.InputError, match='"tent.to_world" has no derivative'):
+        bridge.render(scene, {"tent.to_world": torch.eye(4)})
     fov = torch.tensor(41.0, dtype=torch.float64, requires_grad=True)
     image = bridge.render(scene, {"sensor.fov": fov}, spp=2)
     slope, = torch.autograd.grad((image**2).sum(), fov, create_graph=True)
@@ -224,6 +226,8 @@ def test_jax_gets_what_backward_finds(scene, adjoint):
         image = bridge.render(scene, values, spp=2, spp_grad=8, seed=seed)
         return (image * adjoint).sum(), image
 
+    with pytest.raises(limn.InputError, match='"tent.to_world" has no derivative'):
+        jax.jit(loss)({"tent.to_world": np.eye(4)}, 4)
     before = limn.render(scene, spp=2).value
     for run in (loss, jax.jit(loss)):  # the seed is traced in the second
         (_, image), found = jax.value_and_grad(run, has_aux=True)(values, 4)

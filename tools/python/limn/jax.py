@@ -22,7 +22,7 @@ import numpy as np
 from jax.scipy.linalg import expm
 
 from . import Scene, backward as _reverse, render as _render
-from .motions import Motions, per_number
+from .motions import Motions, check_names, per_number
 
 __all__ = ["pose", "render"]
 
@@ -87,6 +87,7 @@ def render(
     """
     if not isinstance(scene, Scene):
         raise TypeError(f"scene is a {type(scene).__name__}, not a limn.Scene (see limn.load)")
+    check_names(scene, values)
     arrays = {name: jnp.asarray(value, dtype=float) for name, value in values.items()}
     call = _Call(scene, spp, spp if spp_grad is None else spp_grad, threads)
     return _image(call, arrays, jnp.asarray(seed))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,15 @@ def per_number(slope: Any, shape: tuple[int, ...]) -> Any:
     return (slope if slope.size == np.prod(shape) else slope.sum()).reshape(shape)
 
 
+def check_names(scene: Scene, names: Iterable[str]) -> None:
+    """InputError for what has no derivative."""
+    for name in names:
+        scene[name]  # if it is known
+        if name not in scene.parameters:  # ID.to_world
+            raise InputError(f'"{name}" has no derivative: give translate, rotate or scale, or '
+                             "vertex_positions that pose() has turned")
+
+
 class Motions:
     """What is given for the parameters of a scene: values, and steps of motions.
 
@@ -36,6 +45,7 @@ class Motions:
     def __init__(self, scene: Scene, numbers: Mapping[str, Any]) -> None:
         self.numbers = dict(numbers)
         self.steps: dict[str, float] = {}
+        check_names(scene, self.numbers)
         for name, value in self.numbers.items():
             start: Any = scene[name]
             if start is not None and not _moves_shape(scene, name):
