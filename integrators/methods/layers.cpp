@@ -55,13 +55,22 @@ struct LayerType {
   Rgb<double> (*value)(const Seen& seen);
 };
 
+// Of the shapes from 1 on: 0 is nothing.
+Rgb<double> index_of(const Seen& seen) {
+  return grey(1.0 + static_cast<double>(seen.surface.face.shape.index()));
+}
+
+Rgb<double> normal_of(const Seen& seen) { return as_rgb(seen.surface.n_s); }
+
 constexpr LayerType kTypes[] = {
-    {"normals", "XYZ", [](const Seen& seen) { return as_rgb(seen.surface.n_s); }},
+    {"normals", "XYZ", normal_of},
+    {"sh_normal", "XYZ", normal_of},
     {"depth", "Y", [](const Seen& seen) { return grey(seen.distance); }},
     {"position", "XYZ", [](const Seen& seen) { return as_rgb(seen.place); }},
     {"uv", "UV", uv_of},
     {"albedo", "RGB", albedo_of},
     {"alpha", "Y", [](const Seen&) { return grey(1.0); }},
+    {"shape_index", "Y", index_of},
 };
 
 // A slot for each layer, of one lane.

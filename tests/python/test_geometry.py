@@ -50,6 +50,14 @@ def test_rays_meet_what_is_there(scene):
     a, b, c = mesh.positions[mesh.faces[hits["face"][0]]]
     u, v = hits["barycentric"][0]
     np.testing.assert_allclose((1 - u - v) * a + u * b + v * c, [0, 0, 3.5], atol=1e-6)
+    np.testing.assert_allclose(hits["position"], [[0, 0, 3.5]] * 2 + [[0, 0, 0]], atol=1e-6)
+
+
+def test_rays_find_texture_coordinates():
+    scene = limn.load_dict({"type": "scene", "sensor": {"type": "perspective"}, "wall": {
+        "type": "rectangle", "bsdf": {"type": "diffuse", "reflectance": {"type": "checkerboard"}}}})
+    hits = scene.intersect([[0.5, -0.25, 3], [5, 0, 3]], [[0, 0, -1]] * 2)
+    np.testing.assert_allclose(hits["uv"], [[0.75, 0.375], [0, 0]], atol=1e-6)
 
 
 def test_rays_that_are_none(scene):
@@ -114,7 +122,8 @@ def test_another_mesh_turns_about_its_own_bounds(scene):
 def test_steps_that_cannot_be_given(scene):
     for names, message in ((["tent.rotate.x", "tent.rotate.y"], "one axis at a time"),
                            (["tent.scale", "tent.vertex_positions"], "vertex positions and"),
-                           (["tent.displacement"], "no value to give")):
+                           (["tent.displacement"], "no value to give"),
+                           (["tent.to_world"], '"tent.to_world" has no derivative: give translate')):
         with pytest.raises(limn.InputError, match=message):
             Motions(scene, {n: np.array(0.1) for n in names})
 

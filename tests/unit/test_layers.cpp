@@ -29,7 +29,7 @@ TEST(Layers, OfASquare) {
   RunSettings settings;
   settings.spp = 64;
   const LayersResult result = render_layers(scene(), layer_names(), settings);
-  ASSERT_EQ(result.layers.size(), 6u);
+  ASSERT_EQ(result.layers.size(), 8u);
   EXPECT_EQ(result.spp, 64);
   const auto at = [&](const std::string& name, int x, int y, int c) {
     for (const ImageLayer& layer : result.layers) {
@@ -43,6 +43,8 @@ TEST(Layers, OfASquare) {
       const double place_x = (x + 0.5) / 4 - 1, place_y = 1 - (y + 0.5) / 4;
       EXPECT_EQ(at("alpha", x, y, 0), seen ? 1 : 0);
       EXPECT_EQ(at("normals", x, y, 2), seen ? 1 : 0);
+      EXPECT_EQ(at("sh_normal", x, y, 2), seen ? 1 : 0);
+      EXPECT_EQ(at("shape_index", x, y, 0), seen ? 1 : 0);
       EXPECT_NEAR(at("albedo", x, y, 1), seen ? 0.25 : 0, 1e-6);
       EXPECT_NEAR(at("position", x, y, 0), seen ? place_x : 0, 0.01);
       EXPECT_NEAR(at("position", x, y, 2), seen ? 1 : 0, 1e-5);

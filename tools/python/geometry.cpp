@@ -2,6 +2,7 @@
 #include "limn/core/camera_pose.h"
 #include "limn/core/error.h"
 #include "limn/core/ray_tracer.h"
+#include "limn/core/texture.h"
 #include "tools/python/bindings.h"
 
 namespace limn::python {
@@ -54,7 +55,8 @@ nb::dict intersect(const SceneHandle& scene, nb::handle origins, nb::handle dire
   }
   const size_t count = hits.size();
   std::vector<int64_t> shape(count, -1), face(count, -1);
-  std::vector<double> t(count), normal(3 * count), uv(2 * count);
+  std::vector<double> t(count), normal(3 * count), uv(2 * count), places(3 * count),
+      texture(2 * count);
   for (size_t i = 0; i < count; ++i) {
     const FirstHit& hit = hits[i];
     t[i] = hit.t;
@@ -62,7 +64,17 @@ nb::dict intersect(const SceneHandle& scene, nb::handle origins, nb::handle dire
     shape[i] = hit.face.shape.index();
     face[i] = hit.face.face.index();
     for (int k = 0; k < 3; ++k) normal[3 * i + k] = hit.normal[k];
+    const Mesh& mesh = shared->shape(hit.face.shape).mesh;
+    const FaceIndices& corners = mesh.faces[hit.face.face.index()];
+    const double weights[] = {1 - hit.uv[0] - hit.uv[1], hit.uv[0], hit.uv[1]};
+    for (int corner = 0; corner < 3; ++corner) {
+      const Vec3f& p = mesh.positions[corners[corner]];
+      for (int k = 0; k < 3; ++k) places[3 * i + k] += weights[corner] * p[k];
+    }
     for (int k = 0; k < 2; ++k) uv[2 * i + k] = hit.uv[k];
+    if (!mesh.textured) continue;
+    const auto mapped = texture_point<double>(mesh, hit.face.face, {hit.uv[0], hit.uv[1]});
+    for (int k = 0; k < 2; ++k) texture[2 * i + k] = mapped.uv[k];
   }
   nb::dict result;
   result["t"] = owned(std::move(t), {count});
@@ -70,6 +82,8 @@ nb::dict intersect(const SceneHandle& scene, nb::handle origins, nb::handle dire
   result["face"] = owned(std::move(face), {count});
   result["normal"] = owned(std::move(normal), {count, 3});
   result["barycentric"] = owned(std::move(uv), {count, 2});
+  result["position"] = owned(std::move(places), {count, 3});
+  result["uv"] = owned(std::move(texture), {count, 2});
   return result;
 }
 
@@ -108,7 +122,9 @@ void bind_geometry(nb::class_<SceneHandle>& scene) {
           "\"t\": distances (N,), infinite for a miss; \"shape\": numbers in `shapes` (N,), -1 "
           "for a miss; \"face\": rows of mesh(shape).faces (N,); \"normal\": of the face, unit, on "
           "its outer side (N, 3); \"barycentric\": (N, 2), weights of the face's second and third "
-          "corner. Every call builds a ray tracer.");
+          "corner; \"position\": (N, 3), world space; \"uv\": texture coordinates (N, 2), of "
+          "shapes "
+          "that have textures. The last four are 0 for a miss. Every call builds a ray tracer.");
 }
 
 }  // namespace limn::python

@@ -180,10 +180,12 @@ void bind_render(nb::module_& m) {
   def<LayersCall>(
       m, "layers", "dict[str, numpy.ndarray]",
       "What the camera sees besides light: float32, (H, W, 1), (H, W, 2) or (H, W, 3), by name.\n\n"
-      "\"normals\": unit shading normal, world axes; \"depth\": distance along the camera's ray, "
+      "\"normals\": unit shading normal, world axes (\"sh_normal\", as Mitsuba calls it, is the "
+      "same); \"depth\": distance along the camera's ray, "
       "scene units; \"position\": world space; \"uv\": texture coordinates, of shapes that have "
       "textures; \"albedo\": share of light from the camera's direction that is scattered; "
-      "\"alpha\": 1. Means over each pixel's filter; all are 0 where the camera sees no surface.");
+      "\"alpha\": 1; \"shape_index\": number in scene.shapes plus 1. Means over each pixel's "
+      "filter; all are 0 where the camera sees no surface.");
 }
 
 }  // namespace limn::python
