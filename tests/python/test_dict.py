@@ -72,6 +72,26 @@ def test_transforms_go_the_way_of_matrices():
         assert np.abs(corners(transform) - corners(asked[-1])).max() <= 4 * 2.0**-24 * 4
 
 
+def test_transforms_have_inverses():
+    t = limn.Transform().translate([1, 2, 3]).rotate([0, 1, 0], 90).scale(0.5)
+    np.testing.assert_allclose((t @ t.inverse()).matrix, np.eye(4), atol=1e-12)
+    assert repr(limn.Transform().scale(2)).startswith("limn.Transform([[2.0, 0.0, 0.0, 0.0], [0.0,")
+
+
+def test_meshes_have_mitsubas_names():
+    points, corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]
+    scene = limn.load_dict({"type": "scene", "eye": {"type": "perspective"}, "leaf": {
+        "type": "mesh", "positions": points, "faces": corners, "normals": [[0, 0, 1]] * 3,
+        "texcoords": [[0, 0], [1, 0], [0, 1]]}})
+    assert scene.mesh("leaf").positions.tolist() == points
+
+
+@pytest.mark.parametrize("bare", ["perspective", "mesh", "bitmap", "sphere"])
+def test_what_is_bare_belongs_into_a_scene(bare):
+    with pytest.raises(limn.InputError, match=re.escape(f'"name": {{"type": "{bare}", ...}}, ...}}')):
+        limn.load_dict({"type": bare})
+
+
 def test_transforms_move_points():
     t = limn.Transform()
     steps = t.translate([1, 2, 3]).rotate([1, 2, -1], 40).scale([1, 2, 0.5])
@@ -153,6 +173,8 @@ def test_meshes_take_attributes(folder):
     np.testing.assert_allclose(image, image_of({"type": "rgb", "value": [0.1, 0.2, 0.3]})[1],
                                rtol=1e-5)
     assert scene.parameters["roof.vertex_color"].shape == (1, 4, 3)
+    scene["roof.vertex_color"] = scene["roof.vertex_color"][0] / 2
+    np.testing.assert_allclose(scene["roof.vertex_color"][0], np.float32(colours) / 2)
     # What is nearest to the corner (0, 0) of the texture coordinates, of every point.
     texture = {"type": "bitmap", "bitmap": np.array([[[.5, .2, .1], [.9, .9, .9]]]), "raw": True,
                "filter_type": "nearest"}
@@ -456,6 +478,8 @@ def test_scenes_have_settings_and_batches():
      r"^dict\.c\.reflectance\.value: error: expected one or three numbers, not \{'r': 1\}"),
     ({"c": {"type": "diffuse", "reflectance": {"type": "bitmap", "bitmap": [1.0, 2.0]}}},
      r"^dict\.c\.reflectance: error: pixels have shape \(H, W, 1 to 4\), not \(2,\) of float64"),
+    ({"ball": {"type": "sphere", "bsdf": {"type": "diffuse", "reflectance": [0.3, 0.2, 0.1]}}},
+     r'^dict\.ball\.bsdf\.reflectance: error: .* must be given as {"type": "rgb", "value": \[\.\.\.\]}'),
     ({"c": {"type": "cube", "to_world": [[1], [1, 2]]}}, r"^dict\.c\.to_world: error: expected a "),
 ])
 def test_mistakes_of_values_have_a_place(folder, change, text):

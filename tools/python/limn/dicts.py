@@ -40,6 +40,9 @@ TYPES = {
 _TAGS = {type_: tag for tag, types in TYPES.items() for type_ in types}
 # What has parameters to be named.
 _NAMED = {"shape", "bsdf", "emitter", "sensor"}
+# Other names of a mesh's arrays.
+_MESH_NAMES = {"positions": "vertices", "vertex_positions": "vertices",
+               "normals": "vertex_normals", "texcoords": "vertex_texcoords"}
 
 Three = Sequence[float] | npt.NDArray[Any]
 
@@ -138,6 +141,13 @@ class Transform:
         for tag, attributes in self._steps:
             product = _step_matrix(tag, attributes) @ product
         return product
+
+    def inverse(self) -> Transform:
+        """What undoes it."""
+        return Transform(np.linalg.inv(self.matrix))
+
+    def __repr__(self) -> str:
+        return f"limn.Transform({self.matrix.tolist()})"
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> npt.NDArray[Any]:
         return np.asarray(self.matrix, dtype)
@@ -255,6 +265,7 @@ class _Writer:
 
     def mesh(self, place: str, what: Mapping[str, Any]) -> dict[str, Any]:
         """The same shape with a mesh that limn reads: of a file, or of arrays."""
+        what = {_MESH_NAMES.get(k, k): v for k, v in what.items()}
         own = [k for k in what if k.startswith(("vertex_", "face_")) and k != "face_normals"]
         rest = {k: v for k, v in what.items() if k not in ("vertices", "faces", "filename", *own)}
         file = what.get("filename")
@@ -359,7 +370,9 @@ def load_dict(scene: Mapping[str, Any], folder: str = "") -> Scene:
     Raises limn.InputError with the place: dict.ball.bsdf.
     """
     if not isinstance(scene, Mapping) or scene.get("type") != "scene":
-        raise InputError('dict: error: expected {"type": "scene", ...}')
+        kind = scene.get("type") if isinstance(scene, Mapping) else None
+        inside = f'"name": {{"type": "{kind}", ...}}, ' if kind in (*_TAGS, "mesh") else ""
+        raise InputError(f'dict: error: expected {{"type": "scene", {inside}...}}')
     with tempfile.TemporaryDirectory(prefix="limn_") as scratch:
         return _load(scene, _Writer(os.fspath(folder), scratch))
 
@@ -374,6 +387,7 @@ def _load(scene: Mapping[str, Any], writer: _Writer) -> Scene:
     def placed(text: str) -> str:
         for file, place in writer.files.items():
             text = text.replace(file, place)
+        text = text.replace("given as <rgb>", 'given as {"type": "rgb", "value": [...]}')
         return re.sub(
             r"[^\s\"]*string:(\d+)(:\d+)?", lambda m: writer.places[int(m.group(1)) - 1], text
         )
