@@ -136,6 +136,12 @@ Fit::Impl::Impl(std::vector<FitView> all, const FitOptions& options, const RunSe
   check_blur();
   keep_skies();
   if (!options.remesh.empty()) check_remeshing();
+  if (options.smoothing > 1) {
+    warnings.push_back(fmt::format(
+        "smoothing {:g} spreads steps over more than a whole shape: it is a share of the "
+        "shape's diagonal (by default {:g})",
+        options.smoothing, FitOptions{}.smoothing));
+  }
   // As it is before the first step; views differ in little but the camera.
   if (!over_faces()) {
     warn_of_hair_gaps(views[0].scene, settings.spp, settings.threads, warnings);

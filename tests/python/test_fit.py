@@ -206,8 +206,25 @@ def test_a_list_of_targets_is_of_the_sensors():
     losses = [[record.loss for record in fit.history] for fit in fits]
     assert losses[0] == losses[1] == losses[2]
     assert len(fits[0].scenes) == 2
+    stacked = limn.fit(scene, np.stack([t.value for t in targets]), "ball.bsdf.reflectance", 2, spp=2)
+    assert [record.loss for record in stacked.history] == losses[0]
+    with pytest.warns(UserWarning, match="the target is that of the first of 2 sensors"):
+        limn.Fit(scene, targets[0], "ball.bsdf.reflectance", spp=2)
     with pytest.raises(limn.InputError, match="^error: target: 1 images for 2 sensors"):
         limn.Fit(scene, targets[:1], "ball.bsdf.reflectance")
+
+
+def test_smoothing_is_a_share(scene):
+    target = np.zeros((scene.height, scene.width, 3))
+    with pytest.warns(UserWarning, match="smoothing 25 .* it is a share of the shape's diagonal"):
+        limn.Fit(scene, target, "tent.vertex_positions", smoothing=25)
+
+
+# Of values near 1, as Adam's rate elsewhere: step=5 moves by 5 % of the value.
+def test_five_steps_are_five_percent(scene):
+    scene["clay.reflectance"] = 0.8
+    fit = limn.fit(scene, np.zeros((scene.height, scene.width, 3)), "clay.reflectance", 1, step=5, spp=4)
+    np.testing.assert_allclose(fit.values["clay.reflectance"], 0.8 * 0.95, rtol=1e-6)
 
 
 @pytest.mark.parametrize("view, text", [

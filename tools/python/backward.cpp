@@ -109,6 +109,7 @@ void bind_loss(nb::module_& m) {
   def<LossCall>(
       m, "image_loss", "Loss",
       "Renders the scene twice, independently, and compares with a target.\n\n"
+      "Values of l2 and relative-l2 are unbiased: at the target about every other one is negative. "
       "limn.backward with the same seed and the adjoint found here gives an unbiased gradient of "
       "l2 "
       "and relative-l2. With points \"faces\" there is one image, the loss is a function without "

@@ -78,9 +78,11 @@ struct FitCall {
     a.add_former("sampler", "method");
   }
 
-  // A list of images: each is the target of a sensor, the first of `scene`.
+  // A list of images, or an array of them: each is the target of a sensor, the first of `scene`.
   void spread_targets() {
-    if (!nb::isinstance<nb::list>(target) && !nb::isinstance<nb::tuple>(target)) return;
+    const bool stacked =
+        nb::hasattr(target, "shape") && nb::len(nb::object(target.attr("shape"))) == 4;
+    if (!stacked && !nb::isinstance<nb::list>(target) && !nb::isinstance<nb::tuple>(target)) return;
     const nb::list images(target);
     for (nb::handle image : images) {
       if (!nb::hasattr(image, "shape")) return;
@@ -113,6 +115,13 @@ struct FitCall {
   Fit make(const Arguments& given) {
     given.refuse_samples(options.backward.points, {"spp"});
     spread_targets();
+    const Scene& seen = scene->get();
+    if (seen.sensors.size() > 1 && seen.sensor == 0 && nb::len(views) == 0) {
+      warn_all(
+          {fmt::format("the target is that of the first of {} sensors, the others take no part: "
+                       "give a list of targets, one for each",
+                       seen.sensors.size())});
+    }
     for (const auto& [name, range] : bounds) {
       options.bounds.push_back({name, range.first, range.second});
     }
