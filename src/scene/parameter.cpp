@@ -46,14 +46,26 @@ std::optional<Parameter> find_nested(const std::vector<Parameter>& list, const S
   return std::nullopt;
 }
 
+// The same parameter, called by "sensor" in place of the selected sensor's id.
+std::string of_sensor(const Scene& scene, const std::string& name) {
+  if (scene.sensor >= scene.sensors.size()) return name;
+  const std::string& id = scene.sensors[scene.sensor].id;
+  return id.empty() || !name.starts_with(id + ".") ? name : "sensor" + name.substr(id.size());
+}
+
 [[noreturn]] void fail_unknown(const Scene& scene, const std::string& name,
                                const std::vector<Parameter>& list) {
   std::vector<std::string> names;
   for (const Parameter& p : list) names.push_back(p.name);
   std::string advice = "nearest: " + join(nearest_names(name, names, 5));
-  if (name.ends_with(".positions")) advice = "they are called vertex_positions";
-  if (name.ends_with(".x_fov")) advice = "sensor.fov is along the file's fov_axis, which is not x";
-  if (name.ends_with(".faces")) advice = "see mesh() and set_mesh() in Python";
+  const bool is_of_shape =
+      std::any_of(scene.shapes.begin(), scene.shapes.end(),
+                  [&](const Shape& shape) { return shape.id == name.substr(0, name.rfind('.')); });
+  if (is_of_shape && name.ends_with(".positions")) advice = "they are called vertex_positions";
+  if (is_of_shape && name.ends_with(".faces")) advice = "see mesh() and set_mesh() in Python";
+  if (of_sensor(scene, name) == "sensor.x_fov" && scene.camera.x_factor != 1) {
+    advice = "sensor.fov is along the file's fov_axis, which is not x";
+  }
   throw UnknownParameter({scene.file}, "unknown parameter \"" + name + "\" (" + advice + ")");
 }
 
@@ -196,9 +208,12 @@ Parameter find_parameter_or_array(const Scene& scene, const std::string& name) {
   constexpr std::string_view kOneValue = ".value";
   const size_t size = name.size() - (name.ends_with(kOneValue) ? kOneValue.size() : 0);
   const std::vector<Parameter> list = list_parameters(scene);
-  if (auto found = find_nested(list, scene, name.substr(0, size))) {
-    found->name = name;  // results are looked up by the name that was given
-    return *found;
+  const std::string whole = name.substr(0, size);
+  for (const std::string& own : {whole, of_sensor(scene, whole)}) {
+    if (auto found = find_nested(list, scene, own)) {
+      found->name = name;  // results are looked up by the name that was given
+      return *found;
+    }
   }
   if (has_texel_borders(scene)) check_nothing_moves(scene, name);
   fail_unknown(scene, name, list);

@@ -1,6 +1,8 @@
 """Scenes, their parameters and meshes: in, out, and what is refused."""
 
+import json
 import os
+import pickle
 import re
 from collections.abc import Mapping
 
@@ -216,12 +218,28 @@ def test_arrays_change_in_place_by_assignment(scene, name, change):
     np.testing.assert_allclose(scene[name], start, atol=1e-6)
     with pytest.raises(ValueError, match="read-only"):
         scene[name][0] = 0
-    with pytest.raises(ValueError, match="read-only"):
+    with pytest.raises(ValueError, match=r"copy it \(a = scene\[name\].copy\(\)\)"):
         scene[name][1:] += 1
+    with pytest.raises(TypeError, match="not complex"):
+        scene[name] += 1j
+    np.testing.assert_allclose(scene[name], start, atol=1e-6)
     own = scene[name].copy()
     part = own[:1]
     part += 1
     assert np.array_equal(own[:1], part)
+
+
+def test_what_is_computed_of_arrays_is_numbers_and_plain_arrays(scene):
+    value = scene["clay.reflectance"]
+    numbers = [value.max(), value.sum(), value.mean(), (value == value).all(), value @ value]
+    assert all(isinstance(x, np.generic) and hash(x) == hash(x.item()) for x in numbers)
+    assert json.dumps(value.max()) == "0.7"
+    for array in (value * 2, pickle.loads(pickle.dumps(value))):
+        assert type(array) is np.ndarray and array.flags.writeable
+    scene["clay.reflectance"] %= 0.5
+    np.testing.assert_allclose(scene["clay.reflectance"], [0.2, 0, 0.3])
+    scene["clay.reflectance"] //= 0.25
+    assert scene["clay.reflectance"].tolist() == [0, 0, 1]
 
 
 def test_names_of_mitsuba_that_are_called_otherwise(scene):
@@ -232,7 +250,12 @@ def test_names_of_mitsuba_that_are_called_otherwise(scene):
     other = limn.load_dict({"type": "scene", "eye": {"type": "perspective", "fov_axis": "y", "fov": 40,
                             "film": {"type": "hdrfilm", "width": 8, "height": 4}}})
     with pytest.raises(KeyError, match="sensor.fov is along the file's fov_axis, which is not x"):
-        other["sensor.x_fov"]
+        other["eye.x_fov"]
+    other["eye.fov"] = 30
+    assert other["sensor.fov"] == 30
+    for name in ("nope.x_fov", "nope.positions", "nope.faces"):
+        with pytest.raises(KeyError, match="nearest: "):
+            other[name]
     for name, advice in (("tent.positions", "called vertex_positions"), ("tent.faces", r"set_mesh\(\)")):
         with pytest.raises(limn.UnknownParameterError, match=advice):
             scene[name]

@@ -92,7 +92,8 @@ Positions view_positions(std::shared_ptr<const Scene> scene, ShapeId shape);
 // Copies of (V, 3) vertices and (F, 3) indices of corners; InputError for other shapes.
 std::vector<Vec3f> to_positions(nb::handle array);
 std::vector<FaceIndices> to_faces(nb::handle array);
-// numpy.ascontiguousarray(value, dtype), of whatever numpy takes; numpy's errors.
+// numpy.ascontiguousarray(value, dtype), of whatever numpy takes; numpy's errors, and a TypeError
+// for complex numbers.
 nb::object as_array(nb::handle value, const char* dtype);
 
 // A mean with its standard error, as Python sees it.

@@ -31,7 +31,11 @@ Image to_image(nb::handle array) {
 }
 
 nb::object as_array(nb::handle value, const char* dtype) {
-  return nb::module_::import_("numpy").attr("ascontiguousarray")(value, dtype);
+  const nb::module_ numpy = nb::module_::import_("numpy");
+  if (nb::cast<bool>(numpy.attr("iscomplexobj")(value))) {
+    throw nb::type_error("expected real numbers, not complex ones");
+  }
+  return numpy.attr("ascontiguousarray")(value, dtype);
 }
 
 Pixels to_array(Image image) {
