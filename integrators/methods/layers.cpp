@@ -162,6 +162,7 @@ std::vector<std::string> layer_names() { return names_of(kTypes); }
 LayersResult render_layers(const Scene& scene, const std::vector<std::string>& names,
                            const RunSettings& settings) {
   const Stopwatch watch;
+  if (names.empty()) throw InputError("no layer is named (" + known_names(layer_names()) + ")");
   const std::vector<const LayerType*> types = find_types(names);
   check_still(scene, "layers");
   std::vector<std::unique_ptr<SampleEstimator>> estimators;

@@ -42,6 +42,8 @@ def test_layers_have_the_programs_bits(folder, scene):
     assert layers["alpha"].max() == 1 and limn.layers(scene, "depth", spp=1)["depth"].shape[2] == 1
     with pytest.raises(limn.InputError, match="normals"):
         limn.layers(scene, "normal")
+    with pytest.raises(limn.InputError, match="no layer is named .known: normals"):
+        limn.layers(scene, [])
 
 
 def test_an_estimate_computes_like_its_value(scene):
