@@ -136,7 +136,9 @@ Fit::Impl::Impl(std::vector<FitView> all, const FitOptions& options, const RunSe
   check_blur();
   keep_skies();
   if (!options.remesh.empty()) check_remeshing();
-  if (options.smoothing > 1) {
+  const bool is_smoothed = std::any_of(parameters_.begin(), parameters_.end(),
+                                       [](const FitParameter& p) { return p.is_array(); });
+  if (options.smoothing > 1 && is_smoothed) {
     warnings.push_back(fmt::format(
         "smoothing {:g} spreads steps over more than a whole shape: it is a share of the "
         "shape's diagonal (by default {:g})",

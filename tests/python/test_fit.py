@@ -3,6 +3,7 @@
 import json
 import os
 import subprocess
+import warnings
 
 import limn
 import numpy as np
@@ -210,6 +211,9 @@ def test_a_list_of_targets_is_of_the_sensors():
     assert [record.loss for record in stacked.history] == losses[0]
     with pytest.warns(UserWarning, match="the target is that of the first of 2 sensors"):
         limn.Fit(scene, targets[0], "ball.bsdf.reflectance", spp=2)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        limn.Fit(scene.view(0), targets[0], "ball.bsdf.reflectance", spp=2)
     with pytest.raises(limn.InputError, match="^error: target: 1 images for 2 sensors"):
         limn.Fit(scene, targets[:1], "ball.bsdf.reflectance")
 
@@ -218,6 +222,9 @@ def test_smoothing_is_a_share(scene):
     target = np.zeros((scene.height, scene.width, 3))
     with pytest.warns(UserWarning, match="smoothing 25 .* it is a share of the shape's diagonal"):
         limn.Fit(scene, target, "tent.vertex_positions", smoothing=25)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        limn.Fit(scene, target, "clay.reflectance", smoothing=25)
 
 
 # Of values near 1, as Adam's rate elsewhere: step=5 moves by 5 % of the value.

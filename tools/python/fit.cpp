@@ -116,7 +116,7 @@ struct FitCall {
     given.refuse_samples(options.backward.points, {"spp"});
     spread_targets();
     const Scene& seen = scene->get();
-    if (seen.sensors.size() > 1 && seen.sensor == 0 && nb::len(views) == 0) {
+    if (seen.sensors.size() > 1 && !scene->history.sensor_chosen && nb::len(views) == 0) {
       warn_all(
           {fmt::format("the target is that of the first of {} sensors, the others take no part: "
                        "give a list of targets, one for each",

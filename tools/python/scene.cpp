@@ -209,6 +209,7 @@ void bind_changes(nb::class_<SceneHandle>& scene) {
             use_sensor(other.edit(), std::holds_alternative<int>(sensor)
                                          ? std::to_string(std::get<int>(sensor))
                                          : std::get<std::string>(sensor));
+            other.history.sensor_chosen = true;
             return other;
           },
           nb::arg("sensor"), nb::sig("def view(self, sensor: int | str) -> Scene"),

@@ -31,6 +31,7 @@ struct History {
     SharedVector<Vec3f> positions;
   };
   std::map<size_t, Placed> placed;
+  bool sensor_chosen = false;  // by view()
 
   explicit History(const Scene& scene);
   // Of a shape that has another mesh, which is where it was read.
