@@ -175,6 +175,8 @@ def test_meshes_take_attributes(folder):
     assert scene.parameters["roof.vertex_color"].shape == (1, 4, 3)
     scene["roof.vertex_color"] = scene["roof.vertex_color"][0] / 2
     np.testing.assert_allclose(scene["roof.vertex_color"][0], np.float32(colours) / 2)
+    with pytest.raises(limn.InputError, match=r"has shape \(1, 4, 3\), not \(5, 3\)"):
+        scene["roof.vertex_color"] = np.ones((5, 3))
     # What is nearest to the corner (0, 0) of the texture coordinates, of every point.
     texture = {"type": "bitmap", "bitmap": np.array([[[.5, .2, .1], [.9, .9, .9]]]), "raw": True,
                "filter_type": "nearest"}
@@ -204,6 +206,8 @@ def test_later_messages_name_the_dictionary(folder):
     ({"vertices": [[0, 0]], "faces": [[0, 0, 0]]}, r"positions have shape \(V, 3\), not \(1, 2\)"),
     ({"vertices": [[0, 0, 0], [1, 0, 0], [0, np.nan, 0]], "faces": [[0, 1, 2]]}, ".*not finite"),
     ({"vertices": [[0, 0, 0]], "faces": [[0, 0, 0]], "filename": "a.ply"}, "give vertices"),
+    ({"vertices": [[0, 0, 0]], "positions": [[0, 0, 0]], "faces": [[0, 0, 0]]},
+     "vertices and positions are names of the same array"),
     ({"vertices": [[0, 0, 0]], "faces": [[0, 0, 0]], "vertex_color": [1, 2]},
      r"vertex_color has shape \(1, 3\), not \(2,\)"),
     ({"vertices": [[0, 0, 0]], "faces": [[0, 0, 0]], "face_a": [1, 2]},
@@ -479,7 +483,8 @@ def test_scenes_have_settings_and_batches():
     ({"c": {"type": "diffuse", "reflectance": {"type": "bitmap", "bitmap": [1.0, 2.0]}}},
      r"^dict\.c\.reflectance: error: pixels have shape \(H, W, 1 to 4\), not \(2,\) of float64"),
     ({"ball": {"type": "sphere", "bsdf": {"type": "diffuse", "reflectance": [0.3, 0.2, 0.1]}}},
-     r'^dict\.ball\.bsdf\.reflectance: error: .* must be given as {"type": "rgb", "value": \[\.\.\.\]}'),
+     r'^dict\.ball\.bsdf\.reflectance: error: .* must be given as {"type": "rgb", "value": \[\.\.\.\]}'
+     r', {"type": "spectrum", \.\.\.} or a number, not three numbers$'),
     ({"c": {"type": "cube", "to_world": [[1], [1, 2]]}}, r"^dict\.c\.to_world: error: expected a "),
 ])
 def test_mistakes_of_values_have_a_place(folder, change, text):

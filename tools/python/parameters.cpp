@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "limn/core/error.h"
 #include "limn/core/texel_map.h"
 #include "tools/python/bindings.h"
@@ -71,8 +73,9 @@ void check_shape(const ParameterView& view, const nb::ndarray<const double, nb::
   const std::vector<size_t>& shape = view.parameter.array;
   std::vector<size_t> given;
   for (size_t k = 0; k < value.ndim(); ++k) given.push_back(value.shape(k));
-  if (given.size() == 2 && shape.size() == 3 && shape[0] == 1) given.insert(given.begin(), 1);
   if (shape.empty() || given == shape) return;
+  const bool flat = given.size() == 2 && shape.size() == 3 && shape[0] == 1;
+  if (flat && std::equal(given.begin(), given.end(), shape.begin() + 1)) return;
   throw InputError({view.scene->file},
                    fmt::format("parameter \"{}\" has shape {}, not {}", view.parameter.name,
                                shape_text(shape), shape_text(given)));
@@ -172,11 +175,13 @@ void bind_parameter(nb::module_& m) {
       .def_prop_ro(
           "natural_step", [](const ParameterView& v) { return v.parameter.natural_step; },
           "A small step: about a hundredth of what changes the picture a lot.")
-      .def_prop_ro("value", value_of, nb::sig("def value(self) -> float | numpy.ndarray | None"),
-                   "The value: a number, or an array that cannot be written: float64 (3,) of a "
-                   "colour, float32 (V, 3), float32 (H, W, 3) of texels. Of a translation how "
-                   "far it has been moved since the scene was read. None of rotations and scales "
-                   "(Scene.move).")
+      .def_prop_ro(
+          "value", value_of, nb::sig("def value(self) -> float | numpy.ndarray | None"),
+          "The value: a number, or an array that cannot be written: float32 (V, 3) in the "
+          "scene's memory, a copy of others: float64 (3,) of a colour, float32 (H, W, 3) of "
+          "texels. Of a translation how far it has been moved since the scene was read. None of "
+          "rotations and scales "
+          "(Scene.move).")
       .def("__repr__", repr);
 }
 
@@ -237,9 +242,10 @@ void bind_parameters(nb::module_& m, nb::class_<SceneHandle>& scene) {
           "listed.")
       .def("__getitem__", get, nb::arg("name"),
            nb::sig("def __getitem__(self, name: str) -> float | numpy.ndarray | None"),
-           "The value of a parameter, see limn.Parameter.value. Arrays cannot be written: "
-           "scene[name] += x sets all of it. \"ID.to_world\" of shapes, delta "
-           "lights and environment maps: (4, 4), float64, the to_world that a file would have for "
+           "The value of a parameter, see limn.Parameter.value. Arrays cannot be written, but "
+           "assigned: scene[name] += x; for parts of one change a copy. \"ID.to_world\" of "
+           "shapes, delta lights and environment maps: (4, 4), float64, the to_world that a file "
+           "would have for "
            "where they are now; \"sensor.to_world\", or that of its id, is sensor_to_world.")
       .def(
           "__contains__",

@@ -43,6 +43,10 @@ _NAMED = {"shape", "bsdf", "emitter", "sensor"}
 # Other names of a mesh's arrays.
 _MESH_NAMES = {"positions": "vertices", "vertex_positions": "vertices",
                "normals": "vertex_normals", "texcoords": "vertex_texcoords"}
+# What elements are in a dictionary.
+_WORDS = {"rgb": '{"type": "rgb", "value": [...]}', "spectrum": '{"type": "spectrum", ...}',
+          "float": "a number", "integer": "an integer", "boolean": "True or False",
+          "string": "a string", "point": "three numbers", "transform": "a Transform"}
 
 Three = Sequence[float] | npt.NDArray[Any]
 
@@ -265,7 +269,12 @@ class _Writer:
 
     def mesh(self, place: str, what: Mapping[str, Any]) -> dict[str, Any]:
         """The same shape with a mesh that limn reads: of a file, or of arrays."""
-        what = {_MESH_NAMES.get(k, k): v for k, v in what.items()}
+        names: dict[str, str] = {}
+        for k in what:
+            other = names.setdefault(_MESH_NAMES.get(k, k), k)
+            if other != k:
+                raise InputError(f"{place}: error: {other} and {k} are names of the same array")
+        what = {name: what[k] for name, k in names.items()}
         own = [k for k in what if k.startswith(("vertex_", "face_")) and k != "face_normals"]
         rest = {k: v for k, v in what.items() if k not in ("vertices", "faces", "filename", *own)}
         file = what.get("filename")
@@ -387,7 +396,8 @@ def _load(scene: Mapping[str, Any], writer: _Writer) -> Scene:
     def placed(text: str) -> str:
         for file, place in writer.files.items():
             text = text.replace(file, place)
-        text = text.replace("given as <rgb>", 'given as {"type": "rgb", "value": [...]}')
+        text = re.sub("must be given as .*", lambda m: re.sub(
+            r"<(\w+)>", lambda tag: _WORDS.get(tag[1], tag[0]), m[0]), text)
         return re.sub(
             r"[^\s\"]*string:(\d+)(:\d+)?", lambda m: writer.places[int(m.group(1)) - 1], text
         )
