@@ -109,10 +109,10 @@ void bind_loss(nb::module_& m) {
   def<LossCall>(
       m, "image_loss", "Loss",
       "Renders the scene twice, independently, and compares with a target.\n\n"
-      "Values of l2 and relative-l2 are unbiased: at the target about every other one is negative. "
-      "limn.backward with the same seed and the adjoint found here gives an unbiased gradient of "
-      "l2 "
-      "and relative-l2. With points \"faces\" there is one image, the loss is a function without "
+      "Values of l2 and relative-l2 are unbiased: near zero, individual estimates are negative "
+      "about as often as positive. limn.backward with the same seed and the adjoint found here "
+      "gives an unbiased gradient of l2 and relative-l2. With points \"faces\" there is one image, "
+      "the loss is a function without "
       "noise, and limn.backward with the same points gives its gradient.");
 }
 

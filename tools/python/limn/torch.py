@@ -4,6 +4,7 @@
     image = limn.torch.render(scene, {"ball.vertex_positions": v}, spp=16, seed=i)
     ((image - target) ** 2).mean().backward()       # v.grad
 
+torch.tensor copies; torch.from_numpy would share the scene's memory, which must not change.
 Naming limn.torch imports torch, `import limn` does not.
 """
 
