@@ -8,6 +8,7 @@ import subprocess
 import limn
 import numpy as np
 import pytest
+from limn.motions import Motions
 from test_scene import same
 
 POSITIONS = "tent.vertex_positions"
@@ -288,6 +289,36 @@ def test_steps_through_torch_have_the_slopes_of_derivative_images(scene, stepped
     image = bridge.render(scene, values, spp=2, spp_grad=64, seed=4)
     (image * torch.from_numpy(stepped[1])).sum().backward()
     check_steps(stepped, image.detach().numpy(), {n: v.grad.item() for n, v in values.items()})
+
+
+# Two axes of three: slopes of a rotation vector (test_geometry) from those about all axes.
+def check_turns(scene, loss_slopes):
+    turn = {"tent.rotate.x": 0.25, "tent.rotate.z": -0.5}
+    motions = Motions(scene, {n: np.array(v) for n, v in turn.items()})
+    moved, names = motions.moved(scene), ["tent.rotate.x", "tent.rotate.z", "tent.rotate.y"]
+    ones = np.ones((scene.height, scene.width, 3), np.float32)
+    about = limn.backward(moved, ones, names, spp=8, seed=9)
+    expected = motions.slopes({n: about[n].value for n in names})
+    for name, slope in loss_slopes(turn).items():
+        assert slope == pytest.approx(expected[name], rel=1e-5)
+
+
+def test_turns_about_several_axes_through_jax(scene):
+    jax = pytest.importorskip("jax")
+    import limn.jax as bridge
+
+    check_turns(scene, jax.grad(lambda v: bridge.render(scene, v, 2, 8, seed=4).sum()))
+
+
+def test_turns_about_several_axes_through_torch(scene):
+    torch, bridge = torch_and_bridge()
+
+    def slopes(turn):
+        values = {n: torch.tensor(v, requires_grad=True) for n, v in turn.items()}
+        bridge.render(scene, values, 2, 8, seed=4).sum().backward()
+        return {n: v.grad.item() for n, v in values.items()}
+
+    check_turns(scene, slopes)
 
 
 # About z by a right angle; then Rodrigues' formula, whose derivative at rest is a cross product.

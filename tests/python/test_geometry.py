@@ -92,6 +92,40 @@ def test_slopes_of_steps_are_those_of_the_vertices(scene, adjoint):
                                    err_msg=name)
 
 
+@pytest.mark.parametrize("owner", ["tent", "sensor"])
+@pytest.mark.parametrize("turn", [[0.3, -0.7, 1.1], [1e-6, -2e-6, 0], [0, np.pi / 2, 0]])
+def test_several_axes_are_one_rotation(scene, owner, turn):
+    """By Rodrigues' formula; slopes as by differences of the turned vertices."""
+    def rotated(w):
+        angle = np.linalg.norm(w)
+        k = np.cross(np.asarray(w) / angle, np.eye(3)).T
+        return np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k
+
+    def given(w):
+        return {f"{owner}.rotate.{a}": np.array(v) for a, v in zip("xyz", w)}
+
+    motions = Motions(scene, given(turn))
+    moved = motions.moved(scene)
+    if owner == "sensor":
+        expected = rotated(turn) @ scene.sensor_to_world[:3, :3]
+        np.testing.assert_allclose(moved.sensor_to_world[:3, :3], expected, atol=1e-6)
+        return
+    before = scene.mesh("tent").positions.astype(float)
+    center = (before.min(axis=0) + before.max(axis=0)) / 2
+    arms = (before - center) @ rotated(turn).T
+    np.testing.assert_allclose(moved.mesh("tent").positions, center + arms, atol=1e-5)
+    weights = np.random.default_rng(1).normal(size=arms.shape)
+    about = {f"tent.rotate.{a}": (weights * np.cross(e, arms)).sum()
+             for a, e in zip("xyz", np.eye(3))}
+    assert set(motions.needed(["tent.rotate.y"])) == set(about)
+    slopes = motions.slopes(about)
+    for k, axis in enumerate("xyz"):
+        ends = [(weights * ((before - center) @ rotated(turn + s * np.eye(3)[k]).T)).sum()
+                for s in (-1e-5, 1e-5)]
+        np.testing.assert_allclose(slopes[f"tent.rotate.{axis}"], (ends[1] - ends[0]) / 2e-5,
+                                   rtol=1e-4, atol=1e-5)
+
+
 def test_turning_back_ends_where_it_began(scene):
     """The center of the tent's bounds moves as it turns; what it turns about does not."""
     before = scene.mesh("tent").positions.copy()
@@ -120,8 +154,7 @@ def test_another_mesh_turns_about_its_own_bounds(scene):
 
 
 def test_steps_that_cannot_be_given(scene):
-    for names, message in ((["tent.rotate.x", "tent.rotate.y"], "one axis at a time"),
-                           (["tent.scale", "tent.vertex_positions"], "vertex positions and"),
+    for names, message in ((["tent.scale", "tent.vertex_positions"], "vertex positions and"),
                            (["tent.displacement"], "no value to give"),
                            (["tent.to_world"], '"tent.to_world" has no derivative: give translate')):
         with pytest.raises(limn.InputError, match=message):

@@ -37,17 +37,19 @@ class _Call:
     spp_grad: int | None
     threads: int
 
-    def moved(self, values: Mapping[str, Any]) -> Scene:
-        numbers = {n: np.asarray(v, dtype=np.float64) for n, v in values.items()}
-        return Motions(self.scene, numbers).moved(self.scene)
+    def motions(self, values: Mapping[str, Any]) -> Motions:
+        return Motions(self.scene, {n: np.asarray(v, dtype=np.float64) for n, v in values.items()})
 
     def image(self, values: Mapping[str, Any], seed: Any) -> Any:
-        return _render(self.moved(values), self.spp, 2 * int(seed), threads=self.threads).value
+        moved = self.motions(values).moved(self.scene)
+        return _render(moved, self.spp, 2 * int(seed), threads=self.threads).value
 
     def slopes(self, values: Mapping[str, Any], seed: Any, adjoint: Any) -> dict[str, Any]:
-        found = _reverse(self.moved(values), np.asarray(adjoint), list(values),
+        motions = self.motions(values)
+        found = _reverse(motions.moved(self.scene), np.asarray(adjoint), motions.needed(values),
                          spp=self.spp_grad, seed=2 * int(seed) + 1, threads=self.threads)
-        return {n: per_number(found[n].value, v.shape).astype(v.dtype) for n, v in values.items()}
+        slopes = motions.slopes({n: estimate.value for n, estimate in found.items()})
+        return {n: per_number(slopes[n], v.shape).astype(v.dtype) for n, v in values.items()}
 
 
 @partial(jax.custom_vjp, nondiff_argnums=(0,))

@@ -34,12 +34,39 @@ def check_names(scene: Scene, names: Iterable[str]) -> None:
                              "vertex_positions that pose() has turned")
 
 
+def _cross_with(w: Any) -> Any:
+    x, y, z = w
+    return np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+
+
+def _rotation(w: Any) -> tuple[Any, Any]:
+    """R = exp([w]x), and J with dR = [J dw]x R: the left Jacobian of SO(3)."""
+    angle = float(np.linalg.norm(w))
+    k = _cross_with(w)
+    if angle < 1e-4:  # series, exact to rounding
+        a, b, c = 1 - angle**2 / 6, 0.5 - angle**2 / 24, 1 / 6
+    else:
+        a, b = np.sin(angle) / angle, (1 - np.cos(angle)) / angle**2
+        c = (angle - np.sin(angle)) / angle**3
+    return np.eye(3) + a * k + b * k @ k, np.eye(3) + b * k + c * k @ k
+
+
+def _angles(rotation: Any) -> tuple[float, float, float]:
+    """x, y and z with rotation = Rz Ry Rx."""
+    r = rotation
+    level = np.hypot(r[0, 0], r[1, 0])
+    if level < 1e-9:  # y is a right angle: turns about x and z do the same
+        return np.arctan2(-r[1, 2], r[1, 1]), np.arctan2(-r[2, 0], level), 0.0
+    return np.arctan2(r[2, 1], r[2, 2]), np.arctan2(-r[2, 0], level), np.arctan2(r[1, 0], r[0, 0])
+
+
 class Motions:
     """What is given for the parameters of a scene: values, and steps of motions.
 
     A shape of the size z (1 at first) is scaled by 1 + s / z about its pivot c (Scene.move), turned
     about an axis through c, then translated by t: p = c + t + (1 + s / z) R (p0 - c). The moved
-    scene has the pivot c + t and knows the size, so that its slopes are those of the steps.
+    scene has the pivot c + t and knows the size, so that its slopes are those of the steps. Steps of
+    rotate about several axes are one rotation vector w [radians], R = exp([w]x).
     """
 
     def __init__(self, scene: Scene, numbers: Mapping[str, Any]) -> None:
@@ -67,11 +94,18 @@ class Motions:
 
     def _check(self) -> None:
         for owner in {self.split(n)[0] for n in self.steps}:
-            turns = [n for n in self.steps if self.split(n) == (owner, "rotate")]
-            if len(turns) > 1:
-                raise InputError(f"{' and '.join(turns)}: rotations about one axis at a time")
             if f"{owner}.vertex_positions" in self.numbers:
                 raise InputError(f"{owner}: vertex positions and a motion of the same shape")
+
+    def _turns(self) -> dict[str, Any]:
+        """Rotation vectors of what turns about more than one axis."""
+        turns: dict[str, Any] = {}
+        for name, step in self.steps.items():
+            owner, kind = self.split(name)
+            if kind == "rotate":
+                turns.setdefault(owner, {})["xyz".index(name[-1])] = step
+        return {owner: np.array([of.get(k, 0.0) for k in range(3)])
+                for owner, of in turns.items() if len(of) > 1}  # fmt: skip
 
     def moved(self, scene: Scene) -> Scene:
         """A copy of the scene with all that is given."""
@@ -79,6 +113,29 @@ class Motions:
         for name, value in self.numbers.items():
             if name not in self.steps:
                 scene[name] = value
-        for name in sorted(self.steps, key=lambda n: _ORDER[self.split(n)[1]]):
-            scene.move(name, self.steps[name])
+        steps = dict(self.steps)
+        for owner, w in self._turns().items():
+            for axis, angle in zip("xyz", _angles(_rotation(w)[0])):
+                steps[f"{owner}.rotate.{axis}"] = angle
+        for name in sorted(steps, key=lambda n: (_ORDER[self.split(n)[1]], n)):
+            scene.move(name, steps[name])
         return scene
+
+    def needed(self, wanted: Iterable[str]) -> list[str]:
+        """The derivatives of the moved scene from which those of the steps follow."""
+        names = list(wanted)
+        for owner in self._turns():
+            axes = [f"{owner}.rotate.{axis}" for axis in "xyz"]
+            if any(name in names for name in axes):
+                names += [name for name in axes if name not in names]
+        return names
+
+    def slopes(self, found: Mapping[str, Any]) -> dict[str, Any]:
+        """Of the numbers, from the moved scene's derivatives."""
+        slopes = dict(found)
+        for owner, w in self._turns().items():
+            axes = [f"{owner}.rotate.{axis}" for axis in "xyz"]
+            if axes[0] in found:
+                about = np.array([float(found[name]) for name in axes])
+                slopes.update(zip(axes, _rotation(w)[1].T @ about))
+        return slopes

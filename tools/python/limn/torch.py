@@ -58,22 +58,24 @@ class _Render(torch.autograd.Function):
         numbers = {
             n: t.detach().to("cpu", torch.float64).numpy() for n, t in zip(run.names, tensors)
         }
-        scene = Motions(scene, numbers).moved(scene)
-        ctx.run = _Held(scene), run
+        motions = Motions(scene, numbers)
+        scene = motions.moved(scene)
+        ctx.run = _Held(scene), run, motions
         ctx.save_for_backward(*tensors)
         return torch.from_numpy(_render(scene, run.spp, 2 * run.seed, threads=run.threads).value)
 
     @staticmethod
     @torch.autograd.function.once_differentiable
     def backward(ctx: Any, adjoint: Any) -> tuple[Any, ...]:
-        held, run = ctx.run
+        held, run, motions = ctx.run
         wanted = [n for n, need in zip(run.names, ctx.needs_input_grad[2:]) if need]
         found = {}
         if wanted:
-            found = _backward(held.scene, adjoint.cpu().numpy(), wanted, spp=run.spp_grad,
-                              seed=2 * run.seed + 1, threads=run.threads)  # fmt: skip
+            found = _backward(held.scene, adjoint.cpu().numpy(), motions.needed(wanted),
+                              spp=run.spp_grad, seed=2 * run.seed + 1, threads=run.threads)  # fmt: skip
+        slopes = motions.slopes({n: estimate.value for n, estimate in found.items()})
         gradients = [
-            _gradient(found[n].value, t) if n in found else None
+            _gradient(slopes[n], t) if n in slopes else None
             for n, t in zip(run.names, ctx.saved_tensors)
         ]
         return None, None, *gradients
@@ -108,8 +110,8 @@ def render(
     values: tensors of the shapes that scene[name] has, of any real dtype and on any device (the
     image is on the CPU); one number sets all channels of a colour. The scene itself stays as it is.
     Of a parameter without a value (rotations, scales) it is the step by which it moves from where
-    the scene has it; a shape is scaled first, then turned about its center (see Scene.move), about
-    one axis, then translated.
+    the scene has it; a shape is scaled first, then turned about its center (see Scene.move), then
+    translated. Steps of rotate.x, .y and .z together are the axis of a rotation times its angle.
     spp, spp_grad: samples per pixel of the image and of its gradient; None: spp_grad as spp, spp as
     the scene says. The image has the seed 2 * seed, the gradient 2 * seed + 1: both are independent,
     so that the gradient is unbiased where the loss is linear in the image. For a squared difference
