@@ -374,9 +374,10 @@ class Checker {
     std::vector<double> magnitudes = means(radiance), largest;
     const std::vector<double> sums = blocks(magnitudes);
     if (edges_move_) {
-      // Where m is the mean and q the mean square of a sample, those that are not black, few as
-      // they may be, are q / |m| large (filters may be negative): of three channels at once. In a
-      // block that got no light they may be as large as elsewhere on the film.
+      // In blocks where differences have met events, as a pixel's light. Elsewhere, where m is the
+      // mean and q the mean square of a sample, those that are not black, few as they may be, are
+      // q / |m| large (filters may be negative): of three channels at once. In a block that got no
+      // light they may be as large as elsewhere on the film.
       std::vector<double> squares = variances(radiance);
       for (size_t i = 0; i < squares.size(); ++i) {
         squares[i] = squares[i] * radiance.samples() + magnitudes[i] * magnitudes[i];
@@ -386,8 +387,11 @@ class Checker {
       const std::vector<double> shares = blocks(magnitudes);
       const double share = mean_of(shares);
       const double elsewhere = share > 0 ? mean_of(largest) / share : 0;
+      const Moments& met = runs.differences.extrapolated.blocks;
+      const double pixels = static_cast<double>(fine_) * fine_;
       for (size_t i = 0; i < largest.size(); ++i) {
-        largest[i] = 3 * (shares[i] > 0 ? largest[i] / shares[i] : elsewhere);
+        const double unmet = 3 * (shares[i] > 0 ? largest[i] / shares[i] : elsewhere);
+        largest[i] = met.variance(i) > 0 ? sums[i] / pixels : unmet;
       }
     }
     return {windows_, runs.gradient, runs.differences.extrapolated, sums, largest, runs.step};

@@ -36,17 +36,22 @@ struct Change {
 
 // Pixels are taken for independent.
 Change squared_change(const Moments& change) {
-  double sum = 0, squares = 0;
+  double sum = 0, squares = 0, own = 0;
   const auto pixels = static_cast<double>(change.size()) / 3;
   for (size_t i = 0; i + 2 < change.size(); i += 3) {
-    double of_pixel = 0;
-    for (size_t c = i; c < i + 3; ++c)
+    double of_pixel = 0, variance = 0;
+    for (size_t c = i; c < i + 3; ++c) {
       of_pixel += (change.mean(c) * change.mean(c) - change.variance(c)) / 3;
+      variance += change.variance(c) / 3;
+    }
     sum += of_pixel;
     squares += of_pixel * of_pixel;
+    own += 2 * variance * (variance + 2 * std::max(of_pixel, 0.0));
   }
+  // At least that of normal variables, which is all of one pixel.
   const double mean = sum / pixels;
-  return {mean, std::sqrt(std::max(squares / pixels - mean * mean, 0.0) / pixels)};
+  const double between = std::max(squares / pixels - mean * mean, 0.0) / pixels;
+  return {mean, std::sqrt(std::max(between, own / (pixels * pixels)))};
 }
 
 // The differences at every step, and what changes from each to the next.
@@ -228,7 +233,8 @@ OwnBiases own_biases(std::span<const StepTrial> trials, double square) {
     const StepTrial& trial = trials[std::max<size_t>(k, 1)];
     const double change = std::max(0.0, trial.squared_change);
     const double scale = square / (square - 1) / (k == 0 ? square : 1);
-    own.least.push_back((change - trial.change_error) * scale * scale);
+    const double found = k > 0 ? change - trial.change_error : 0;
+    own.least.push_back(std::max(found, 0.0) * scale * scale);
     own.most.push_back((change + trial.change_error) * scale * scale);
   }
   return own;
@@ -251,20 +257,24 @@ double most_squared_bias(std::span<const StepTrial> trials, const std::vector<do
 
 StepForecast best_step(std::span<const StepTrial> trials, double samples) {
   const double factor = trials[1].step / trials[0].step, square = factor * factor;
-  const OwnBiases own = own_biases(trials, square);
-  std::vector<double> biases = own.most, errors;  // squared
-  // Edges on the film that cross the borders of pixels within the step bias their derivatives as a
-  // whole: then the mean of the squares falls with h, and no slower; else with h^2 at least. Steps
-  // beyond what moves change the image no further: what a smaller one shows is there.
+  OwnBiases own = own_biases(trials, square);
+  // Steps beyond what moves change the image no further: what a smaller one shows is there.
   const auto is_found = [&](size_t k) {
     return trials[k].squared_change > 2 * trials[k].change_error;
   };
+  for (size_t k = 1; k < trials.size(); ++k) {
+    own.least[k] = std::max(is_found(k) ? own.least[k] : 0.0, own.least[k - 1]);
+    own.most[k] = std::max(own.most[k], own.least[k]);
+  }
+  std::vector<double> biases = own.most, errors;  // squared
+  // Edges on the film that cross the borders of pixels within the step bias their derivatives as a
+  // whole: then the mean of the squares falls with h, and no slower; else with h^2 at least.
   double fall = square;
   for (size_t k = trials.size() - 1; k-- > 0;) {
     const double ratio = trials[k + 1].squared_change / trials[k].squared_change;
     if (k > 0 && is_found(k) && is_found(k + 1)) fall = std::clamp(ratio, factor, square);
     const double fallen = biases[k + 1] / fall;
-    biases[k] = std::min(biases[k], k > 0 && is_found(k) ? std::max(fallen, own.least[k]) : fallen);
+    biases[k] = std::min(biases[k], std::max(fallen, own.least[k]));
   }
   for (size_t k = 0; k < trials.size(); ++k)
     errors.push_back(biases[k] + trials[k].variance / std::max(1.0, samples));

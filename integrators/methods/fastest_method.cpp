@@ -47,7 +47,7 @@ void warn_of_bias(const GradientOptions& options, const DifferencePlan& plan,
   for (size_t k = 0; k < plan.steps.size(); ++k) {
     warnings.push_back(
         fmt::format("finite differences were chosen: the derivative of \"{}\" is biased, as a root "
-                    "mean square over pixels by {:.2g} at most, as far as a pilot can tell",
+                    "mean square over pixels by an estimated {:.2g} at most",
                     options.parameters[k], std::sqrt(plan.steps[k].forecast.most_squared_bias)));
   }
 }
@@ -76,8 +76,10 @@ GradientResult run_fastest(const TermMethod& method, const Scene& scene,
     notes = {{"chosen", chosen ? "fd (biased)" : "adaptive"},
              {"expected squared error of fd over adaptive's", *ratio}};
     if (settings.store) {
-      settings.store->identify("choice of fastest",
-                               fmt::format("{} {}", chosen, plan.steps[0].forecast.step));
+      std::string choice = fmt::format("{}", chosen);
+      for (const DifferencePlan::Step& step : plan.steps)
+        choice += fmt::format(" {} {}", step.forecast.step, step.samples);
+      settings.store->identify("choice of fastest", choice);
     }
     if (!chosen) return std::nullopt;
     if (rays > 0) left.spp = static_cast<int>(std::min(plan.steps[0].samples, 1e9));
@@ -85,6 +87,7 @@ GradientResult run_fastest(const TermMethod& method, const Scene& scene,
     GradientResult result = run_planned("differences", scene, of_differences, left, plan, {});
     result.seconds += before;
     result.setup_seconds += before - plan.seconds;  // the plan's are in it
+    result.planned_spp = left.spp;
     warn_of_bias(options, plan, result.warnings);
     return result;
   };

@@ -192,7 +192,8 @@ class GradientCommand final : public Command {
     }
     if (stats_) print_stats(result.stats, result.terms);
     const bool all = settings.seconds > 0 && !settings.interrupted->load();
-    return finish_status(result.non_finite, result.spp, all ? result.spp : settings.spp,
+    return finish_status(result.non_finite, result.spp,
+                         all ? result.spp : std::max(settings.spp, result.planned_spp),
                          command_line);
   }
 

@@ -112,6 +112,7 @@ struct GradientResult {
   Moments radiance;                           // the image itself, from the same samples
   std::vector<TermRun> terms;                 // all that the scene has, in the method's order
   int64_t spp = 0;                            // samples per pixel that were finished
+  int planned_spp = 0;                        // where they are not those asked for (`fastest`)
   int pilot_spp = 0;                          // samples per pixel of the pilot that chose `terms`
   double seconds = 0;
   double setup_seconds = 0;  // edges, samplers, ray tracer, pilot
