@@ -21,7 +21,7 @@ struct StepTrial {
 // pilot meets no edge and sees no variance, which grows as 1 / h. trials: by ascending step.
 void extrapolate_variances(std::span<StepTrial> trials);
 
-// What differences at a step are expected to leave with the samples of a run.
+// The squared error that differences at a step are expected to have in a run.
 struct StepForecast {
   double step = 0;
   double squared_bias = 0, variance = 0;

@@ -55,7 +55,7 @@ struct LayerType {
   Rgb<double> (*value)(const Seen& seen);
 };
 
-// Of the shapes from 1 on: 0 is nothing.
+// The shape's place in the scene, counted from 1; 0 where no shape is seen.
 Rgb<double> index_of(const Seen& seen) {
   return grey(1.0 + static_cast<double>(seen.surface.face.shape.index()));
 }

@@ -25,7 +25,7 @@ struct TermMethod {
   bool or_differences = false;  // where pilots expect less error of them
 };
 
-// What pilots expect of a run.
+// The squared error and the cost that pilots predict for a run.
 struct TermForecast {
   // Of each parameter, summed over channels: the variance of one sample of every term.
   std::vector<double> units;

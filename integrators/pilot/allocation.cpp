@@ -44,7 +44,7 @@ void raise_to_least_share(std::vector<double>& counts) {
   for (double& count : counts) count = std::max(count, kLeastShare * mean);
 }
 
-// Of windows without the cell in their middle.
+// Means over a window around each cell, the cell itself left out.
 std::vector<double> means_around(const PlanGrid& grid, const std::vector<double>& values,
                                  int radius) {
   std::vector<double> means = window_means(grid, values, radius);

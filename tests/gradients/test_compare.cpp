@@ -339,6 +339,16 @@ TEST(Differences, BestStepKnowsStepsBeyondWhatMoves) {
                                          {0.0426, 0.9, 0.68, 0.15},
                                          {0.17, 0.07, 0.28, 0.027}};
   EXPECT_LT(best_step(trials, 620).step, 0.0106);
+  // A slat that all larger steps carry past the window: their bias is at least what the smaller one
+  // shows, (16 / 15)^2 times its change, though they change no further and have no noise.
+  const std::vector<StepTrial> slat = {{0.0001, 400, 0, 1},
+                                       {0.0004, 100, 50, 5},
+                                       {0.0016, 0, 0.1, 0.01},
+                                       {0.0064, 0, 0.01, 0.001},
+                                       {0.0256, 0, 0, 0.001}};
+  const StepForecast far = best_step(slat, 1);
+  EXPECT_GT(far.step, 0.0004);
+  EXPECT_GE(far.most_squared_bias, (50 - 5) * std::pow(16 / 15.0, 2) * 0.999);
 }
 
 TEST(Differences, APilotThatTookAllTheTimeLeavesTheFewestSamples) {

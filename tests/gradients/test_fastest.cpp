@@ -88,6 +88,8 @@ TEST(Fastest, SaysThatDifferencesAreBiased) {
     EXPECT_GT(bias, 0);
     EXPECT_TRUE(std::isfinite(bias));
   }
+  EXPECT_EQ(run.planned_spp, run.spp);
+  EXPECT_GT(run.spp, 32);
   ASSERT_GE(run.warnings.size(), 2u);
   EXPECT_NE(run.warnings[0].find("is biased"), std::string::npos) << run.warnings[0];
 }
