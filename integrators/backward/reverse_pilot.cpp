@@ -360,7 +360,7 @@ class Pilot {
     if (!gains) best = usual;
     if (candidates_.size() > 1) {
       const Choice listed = candidates_[1].best(units);
-      if (listed.product < kBetter * best.product) {
+      if (lists_silhouettes(listed.product, best.product)) {
         best = listed;
         chosen = &candidates_[1];
         gains = true;
@@ -469,6 +469,8 @@ class Pilot {
 };
 
 }  // namespace
+
+bool lists_silhouettes(double listed, double drawn) { return listed < kBetter * drawn; }
 
 BackwardOptions without_pilot(const BackwardOptions& options) {
   if (!options.method->reverse->chooses) return options;

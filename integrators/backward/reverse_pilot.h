@@ -21,6 +21,10 @@ struct ReversePlan {
 // With the method that stands in for `adaptive` where there is no pilot; other methods stay.
 BackwardOptions without_pilot(const BackwardOptions& options);
 
+// Whether a run lists silhouettes for which pilots predict so much squared error x work, against
+// what they predict for `forest`.
+bool lists_silhouettes(double listed, double drawn);
+
 // options: of the method `adaptive` or another; then, and where samples, terms or uniform pixels
 // are asked for, in runs too short for a pilot and where the scene has times, there is no pilot:
 // `adaptive` is `forest` then, or `silhouettes` where one of its own terms is asked for, or where

@@ -531,6 +531,7 @@ CheckResult check(const Scene& scene, const CheckOptions& options, const RunSett
   }
   // Before the search for a step.
   check_task(method, Task::kGradient);
+  refuse_differences(method);
   if (method->check) method->check(scene);
   check_warp(options.warp, {method});
   check_blur(options.blur, {method});

@@ -21,6 +21,7 @@ inline std::vector<MethodType> other_methods() {
   return {{.name = "fd",
            .description = "central finite differences with common random numbers",
            .terms = {"differences"},
+           .differs = true,
            .run = run_differences},
           {.name = "path",
            .description = "path tracing with multiple importance sampling of emitters and BSDFs",

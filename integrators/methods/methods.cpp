@@ -119,6 +119,14 @@ void check_task(const Method& method, Task task) {
                    ")");
 }
 
+void refuse_differences(const Method& method) {
+  if (!method->differs) return;
+  throw InputError("the method \"" + method.name() +
+                   "\" takes finite differences, or may, which a check would compare with "
+                   "themselves: take another, as " +
+                   Method(Task::kGradient).name());
+}
+
 void check_blur(const Blur& blur, const std::vector<Method>& methods) {
   if (blur.sigma == 0 && blur.gamma == 0) return;
   const auto blurs = [](const Method& method) { return method->blurs.has_value(); };

@@ -76,6 +76,7 @@ void set_up(MethodType& row, const TermMethod& given) {
                        method.warps || method.closed;
   row.closed_light = method.closed;
   row.warps = method.warps;
+  row.differs = method.or_differences;
   row.biased = (method.warps && !method.unbiased) || method.or_differences;
   row.run = [method](const MethodType&, const Scene& scene, const GradientOptions& options,
                      const RunSettings& settings) {

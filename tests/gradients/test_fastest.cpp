@@ -1,6 +1,7 @@
 // The method fastest: what it chooses, what it says of that, and that the run is the chosen one's.
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cmath>
 #include <map>
 
@@ -92,6 +93,26 @@ TEST(Fastest, SaysThatDifferencesAreBiased) {
   EXPECT_GT(run.spp, 32);
   ASSERT_GE(run.warnings.size(), 2u);
   EXPECT_NE(run.warnings[0].find("is biased"), std::string::npos) << run.warnings[0];
+}
+
+// It has the samples that were asked for, but not the last of those that the pilots planned.
+TEST(Fastest, TellsThatItIsNotComplete) {
+  const TempFiles files;
+  GradientOptions options;
+  options.parameters = {kLamp};
+  options.method = "fastest";
+  options.samples = std::nullopt;
+  std::atomic<bool> interrupted = false;
+  RunSettings settings;
+  settings.spp = 32;
+  settings.seed = 1;
+  settings.threads = 1;
+  settings.interrupted = &interrupted;
+  settings.progress = [&](double done) { interrupted = done > 0.9; };
+  const GradientResult run = gradient(moving_lamp(files), options, settings);
+  ASSERT_EQ(chosen(run), "fd (biased)");
+  EXPECT_GE(run.spp, 32);
+  EXPECT_LT(run.spp, run.planned_spp);
 }
 
 // Without a pilot there is nothing to choose by.

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cmath>
 
+#include "integrators/backward/reverse_pilot.h"
 #include "limn/core/image.h"
 #include "limn/integrators/backward.h"
 #include "limn/integrators/parts.h"
@@ -77,6 +78,13 @@ TEST(ReversePilot, ChoosesAlikeOnAnyNumberOfThreads) {
   const BackwardResult three = run(scene, "adaptive", 96, 3, 3);
   EXPECT_EQ(one.decision, three.decision);
   EXPECT_EQ(means(one), means(three));
+}
+
+// Pilots miss what edges drawn at random meet rarely: a promise of less than half is not enough.
+TEST(ReversePilot, ListsSilhouettesUnlessDrawsPromiseHalf) {
+  EXPECT_TRUE(lists_silhouettes(1.9, 1));
+  EXPECT_FALSE(lists_silhouettes(2.1, 1));
+  EXPECT_TRUE(lists_silhouettes(0, 1e-300));
 }
 
 // With one sample less than the shortest run with a pilot there is none.

@@ -303,11 +303,15 @@ TEST_F(Program, FastestSaysWhatItChose) {
   EXPECT_NE(bytes.find(chosen), std::string::npos);
 }
 
-TEST_F(Program, ChecksAnyMethod) {
-  for (const std::string method : {"li2019", "fd"}) {
-    const Outcome outcome = run("check " + scene_ + " --spp 512 --block 2 --method " + method +
-                                " --wrt screen.translate.y");
-    EXPECT_TRUE(outcome.status == 0 || outcome.status == 4) << method << outcome.text;
+TEST_F(Program, ChecksAnyMethodButDifferences) {
+  const std::string check = "check " + scene_ + " --block 2 --wrt screen.translate.y --method ";
+  const Outcome outcome = run(check + "li2019 --spp 512");
+  EXPECT_TRUE(outcome.status == 0 || outcome.status == 4) << outcome.text;
+  for (const std::string method : {"fd", "fastest", "fastest:film=fixed"}) {
+    EXPECT_EQ(refused(check + method + " --spp 2"),
+              "error: the method \"" + method +
+                  "\" takes finite differences, or may, which a check would compare with "
+                  "themselves: take another, as adaptive\n");
   }
 }
 

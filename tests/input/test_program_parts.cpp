@@ -101,6 +101,19 @@ TEST_F(Parts, OfAGradientJoinToTheBitsOfOneRun) {
   expect_same(command, out(), files);
 }
 
+// Images are cheap here: differences take more samples than were asked for.
+TEST_F(Parts, TellTheSamplesThatTheRunPlans) {
+  const Outcome outcome = run("gradient " + scene_ +
+                              " --method fastest --spp 32 --wrt lamp.translate.x --part 1/1 -o " +
+                              files_.path("one.part"));
+  int done = 0, all = 0;
+  const size_t at = outcome.text.find("part 1/1, ");
+  ASSERT_NE(at, std::string::npos) << outcome.text;
+  ASSERT_EQ(std::sscanf(outcome.text.c_str() + at, "part 1/1, %d of %d", &done, &all), 2);
+  EXPECT_GT(all, 32);
+  EXPECT_EQ(done, all);
+}
+
 // Wherever a bit flips, parts are not joined, and the part made again joins to the same bits.
 TEST_F(Parts, WithAFlippedBitAreRefused) {
   const std::string command = "gradient " + scene_ + " --spp 9 --method fd --wrt blaze.radiance";

@@ -85,7 +85,7 @@ int run_part(const CommonOptions& common, const Scene& scene,
   writer.finish();
   if (!common.quiet) {
     fmt::print("{}: part {}, {} of {} samples per pixel, {:.3g} MB\n", output, common.part,
-               writer.samples(), settings.spp,
+               writer.samples(), writer.spp(),
                static_cast<double>(std::filesystem::file_size(output)) / 1e6);
   }
   return finish_status(bad, 0, 0, request.line);
