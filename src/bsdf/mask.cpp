@@ -7,7 +7,7 @@
 namespace limn {
 namespace {
 
-class Mask final : public BothScalars<Mask, NestingBsdf> {
+class Mask : public BothScalars<Mask, NestingBsdf> {
  public:
   Mask(std::vector<std::shared_ptr<Bsdf>> nested, const ConstantOrTexture& opacity)
       : BothScalars(std::move(nested)), opacity_(number("opacity", opacity)) {
@@ -81,6 +81,15 @@ class Mask final : public BothScalars<Mask, NestingBsdf> {
   BsdfNumber opacity_;
 };
 
+// It has no numbers, as in Mitsuba.
+class Null final : public Mask {
+ public:
+  using Mask::Mask;
+  std::vector<ParameterRef> parameters() override { return {}; }
+  std::string describe() const override { return "null"; }
+  std::shared_ptr<Bsdf> clone() const override { return std::make_shared<Null>(*this); }
+};
+
 }  // namespace
 
 std::shared_ptr<Bsdf> read_mask(Properties& properties) {
@@ -90,7 +99,7 @@ std::shared_ptr<Bsdf> read_mask(Properties& properties) {
 
 std::shared_ptr<Bsdf> read_null(Properties& /*properties*/) {
   std::vector<std::shared_ptr<Bsdf>> nothing{make_diffuse(grey(0.0))};
-  return std::make_shared<Mask>(std::move(nothing), 0.0);
+  return std::make_shared<Null>(std::move(nothing), 0.0);
 }
 
 }  // namespace limn

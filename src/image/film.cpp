@@ -1,11 +1,14 @@
 // Reconstruction filters and their support on the film.
 #include "limn/core/film.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
 
 #include "limn/core/check.h"
+#include "limn/core/memory.h"
 #include "limn/core/vec.h"
 
 namespace limn {
@@ -246,6 +249,19 @@ Film::Range Film::range_x(int pixel) const {
 
 Film::Range Film::range_y(int pixel) const {
   return range_around(pixel + 0.5, crop_y, crop_y + crop_height, sample_border, filter.radius);
+}
+
+void check_film_size(const SourceLocation& where, int width, int height,
+                     const std::string& remedy) {
+  // Memory of an image, measured on films of 1, 4 and 16 million pixels; derivatives take more.
+  constexpr double kBytesPerPixel = 76;
+  const int64_t pixels = int64_t{width} * height;
+  const std::string size = fmt::format("the film of {} x {} pixels", width, height);
+  if (pixels > kMaxPixels) {
+    throw InputError(
+        where, fmt::format("{} is too large (at most {} pixels): {}", size, kMaxPixels, remedy));
+  }
+  require_memory(where, kBytesPerPixel * static_cast<double>(pixels), size, remedy);
 }
 
 Image to_image(const std::vector<double>& values, const Film& film) {

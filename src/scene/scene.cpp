@@ -99,6 +99,25 @@ void use_sensor(Scene& scene, const std::string& name) {
                    "there is no sensor \"" + name + "\" (known: " + sensor_names(scene) + ")");
 }
 
+void resize_film(Scene& scene, int width, int height) {
+  const Film& film = scene.film;
+  if (film.crop_width != scene.camera.width || film.crop_height != scene.camera.height) {
+    throw InputError(film.where, "a film with a crop window cannot be resized");
+  }
+  if (width < 1) throw FieldError("width", "must be at least 1");
+  if (height < 1) throw FieldError("height", "must be at least 1");
+  check_film_size({scene.file}, width, height, "lower width and height");
+  const auto resize = [=](auto& sensor) {
+    sensor.camera.width = width;
+    sensor.camera.height = height;
+    sensor.camera.half_height = sensor.camera.half_square * height / width;
+    sensor.film.crop_width = width;
+    sensor.film.crop_height = height;
+  };
+  resize(scene);
+  if (scene.sensor < scene.sensors.size()) resize(scene.sensors[scene.sensor]);
+}
+
 void set_shading(Scene& scene, ShadingModel model) {
   scene.shading = model;
   const bool mitsuba = model == ShadingModel::kMitsuba;

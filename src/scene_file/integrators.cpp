@@ -123,9 +123,8 @@ void read_integrator(const ObjectDescription& object, const SceneDescription& de
   }
   scene.max_depth = type->max_depth;
   if (!type->is_depth_fixed) {
-    constexpr char kRange[] = "must be -1 (no limit) or at least 1 (0 gives a black image)";
-    scene.max_depth = depth(p, "max_depth", type->max_depth, -1, kRange);
-    if (scene.max_depth == 0) p.fail("max_depth", kRange);
+    scene.max_depth = depth(p, "max_depth", type->max_depth, -1, kDepthRange);
+    if (scene.max_depth == 0) p.fail("max_depth", kDepthRange);
   }
   if (!type->is_depth_fixed) scene.rr_depth = depth(p, "rr_depth", 5, 1, "must be 1 or more");
   scene.hide_emitters = p.boolean("hide_emitters", false);

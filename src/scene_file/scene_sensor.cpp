@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 
-#include "limn/core/memory.h"
 #include "limn/core/names.h"
 #include "src/base/text.h"
 
@@ -84,9 +83,6 @@ std::string choice(Properties& properties, const std::string& name, const std::s
   properties.fail(name, unknown_name("value", word, known));
 }
 
-// Memory of an image, measured on films of 1, 4 and 16 million pixels; derivatives take more.
-constexpr double kBytesPerPixel = 76;
-
 void read_crop(Properties& p, const Camera& camera, Film& film) {
   film.crop_x = bounded_integer(p, "crop_offset_x", 0, 0);
   film.crop_y = bounded_integer(p, "crop_offset_y", 0, 0);
@@ -97,15 +93,9 @@ void read_crop(Properties& p, const Camera& camera, Film& film) {
     p.fail("the crop window reaches beyond the film (" + std::to_string(camera.width) + " x " +
            std::to_string(camera.height) + " pixels)");
   }
-  const int64_t pixels = int64_t{film.crop_width} * film.crop_height;
-  const std::string size = "the film of " + std::to_string(film.crop_width) + " x " +
-                           std::to_string(film.crop_height) + " pixels";
-  const std::string remedy =
-      "lower width and height (with -D where the scene has parameters for them), or crop it";
-  if (pixels > kMaxPixels) {
-    p.fail(size + " is too large (at most " + std::to_string(kMaxPixels) + " pixels): " + remedy);
-  }
-  require_memory(p.where(), kBytesPerPixel * static_cast<double>(pixels), size, remedy);
+  check_film_size(
+      p.where(), film.crop_width, film.crop_height,
+      "lower width and height (with -D where the scene has parameters for them), or crop it");
 }
 
 // True for one channel. Only rgb and luminance are written.
@@ -280,6 +270,7 @@ void read_view(DescribedProperties& p, const std::string& type, Exposure& exposu
   if (orthographic) {
     size = normalize_axes(to_world);
     camera.half_width = size.x;
+    camera.half_square = size.y;
     camera.half_height = size.y * camera.height / camera.width;
   } else {
     read_fov(p, camera);

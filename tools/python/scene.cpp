@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <limits>
 #include <map>
 
 #include "limn/core/coverage.h"
@@ -130,6 +131,69 @@ void set_shading(SceneHandle& scene, const std::string& name) {
   }
   limn::set_shading(scene.edit(),
                     name == "mitsuba" ? ShadingModel::kMitsuba : ShadingModel::kContinuous);
+}
+
+void set_max_depth(SceneHandle& scene, int depth) {
+  if (depth < -1 || depth == 0) throw FieldError("max_depth", kDepthRange);
+  scene.edit().max_depth = depth;
+}
+
+void set_rr_depth(SceneHandle& scene, int depth) {
+  if (depth < 1) throw FieldError("rr_depth", "must be 1 or more");
+  scene.edit().rr_depth = depth;
+}
+
+// Of the scene and of its sensor among those of the file, where view() finds them.
+template <class Set>
+void set_sampler(Scene& scene, const Set& set) {
+  set(scene);
+  if (scene.sensor < scene.sensors.size()) set(scene.sensors[scene.sensor]);
+}
+
+void set_spp(SceneHandle& scene, int spp) {
+  constexpr int kMost = std::numeric_limits<int>::max() / 2;
+  if (spp < 1 || spp > kMost)
+    throw FieldError("spp", fmt::format("must lie between 1 and {}", kMost));
+  set_sampler(scene.edit(), [=](auto& sampled) { sampled.sample_count = spp; });
+}
+
+void set_seed(SceneHandle& scene, int64_t seed) {
+  if (seed < 0) throw FieldError("seed", "must not be negative");
+  set_sampler(scene.edit(), [=](auto& sampled) { sampled.seed = static_cast<uint64_t>(seed); });
+}
+
+[[noreturn]] void refuse_pickle(const SceneHandle&) {
+  throw nb::type_error(
+      "a limn.Scene cannot be pickled: load it in each process, then set there what was changed");
+}
+
+void bind_settings(nb::class_<SceneHandle>& scene) {
+  scene
+      .def(
+          "resize",
+          [](SceneHandle& s, int width, int height) { resize_film(s.edit(), width, height); },
+          nb::arg("width"), nb::arg("height"),
+          "Gives the sensor a film of another size in pixels, as Mitsuba's film.size does.\n\n"
+          "What the camera sees across stays. So images are those of a file with this size and "
+          "fov_axis \"x\", to the bit. limn.InputError for films with a crop window.")
+      .def_prop_rw(
+          "max_depth", [](const SceneHandle& s) { return s.get().max_depth; }, set_max_depth,
+          "Most segments of a path, as in Mitsuba: 1 emission alone, 2 direct light, -1 no limit.")
+      .def_prop_rw(
+          "rr_depth", [](const SceneHandle& s) { return s.get().rr_depth; }, set_rr_depth,
+          "The depth from which on Russian roulette ends paths, from 1 on.")
+      .def_prop_rw(
+          "hide_emitters", [](const SceneHandle& s) { return s.get().hide_emitters; },
+          [](SceneHandle& s, bool hide) { s.edit().hide_emitters = hide; },
+          "Does the camera see through shapes that emit, and no environment?")
+      .def_prop_rw(
+          "spp", [](const SceneHandle& s) { return s.get().sample_count; }, set_spp,
+          "Samples per pixel of runs that are given no spp, from 1 on.")
+      .def_prop_rw(
+          "seed", [](const SceneHandle& s) { return s.get().seed; }, set_seed,
+          "The seed of runs that are given none, from 0 on.")
+      .def("__reduce__", refuse_pickle,
+           nb::sig("def __reduce__(self) -> str | tuple[typing.Any, ...]"));
 }
 
 std::vector<std::string> shape_ids(const SceneHandle& scene) {
@@ -264,6 +328,7 @@ nb::class_<SceneHandle> bind_scene(nb::module_& m) {
       "that "
       "were started keep the state they were started with.");
   bind_changes(scene);
+  bind_settings(scene);
   scene
       .def_prop_ro(
           "file", [](const SceneHandle& s) { return s.get().file; }, "Its XML file.")
@@ -273,12 +338,6 @@ nb::class_<SceneHandle> bind_scene(nb::module_& m) {
       .def_prop_ro(
           "height", [](const SceneHandle& s) { return s.get().film.crop_height; },
           "Rows of its images.")
-      .def_prop_ro(
-          "spp", [](const SceneHandle& s) { return s.get().sample_count; },
-          "Samples per pixel that the file asks for.")
-      .def_prop_ro(
-          "seed", [](const SceneHandle& s) { return s.get().seed; },
-          "The seed that the file asks for.")
       .def_prop_ro(
           "smooth_as", [](const SceneHandle& s) { return s.get().smooth_as; },
           "The roughness that its smooth conductors, dielectrics and plastics were given, see "

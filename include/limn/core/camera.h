@@ -38,8 +38,8 @@ struct Camera {
   int width = 768;  // full film, pixels
   int height = 576;
   // Of an orthographic camera, whose rays are parallel to `forward` and start on a film around
-  // `origin`: half of its extent along `left` and `up` [scene units].
-  double half_width = 0, half_height = 0;
+  // `origin`: half of its extent along `left` and `up` [scene units], and along `up` of a square.
+  double half_width = 0, half_height = 0, half_square = 0;
   bool is_orthographic() const { return half_width > 0; }
   // Of a thin lens around `origin`: its radius, and the distance along `forward` of the plane that
   // is in focus [scene units].

@@ -89,6 +89,9 @@ struct Film {
   Range range_y(int pixel) const;
 };
 
+// InputError at `where` for a film of more than kMaxPixels, or for which there is no memory.
+void check_film_size(const SourceLocation& where, int width, int height, const std::string& remedy);
+
 // Converts crop_height by crop_width by 3 values to an image of the film's full size.
 Image to_image(const std::vector<double>& values, const Film& film);
 

@@ -50,6 +50,9 @@ struct Shape {
   std::string emitter_id;                     // "" if none
 };
 
+// Of max_depth; every reader says it so.
+inline constexpr char kDepthRange[] = "must be -1 (no limit) or at least 1 (0 gives a black image)";
+
 // The content of a <sensor> element.
 struct Sensor {
   std::string id;  // "" if none
@@ -119,6 +122,11 @@ void use_sensor(Scene& scene, const std::string& name);
 std::string sensor_names(const Scene& scene);
 // The id of the selected sensor, or its index if it has no id.
 std::string sensor_name(const Scene& scene);
+
+// Gives the selected sensor, in `sensors`, too, a film of another size [pixels], as a change of
+// film.size alone does in Mitsuba: what it sees across stays, so that files of this size are the
+// same where fov_axis is x. InputError for crop windows, and for sizes that no film has.
+void resize_film(Scene& scene, int width, int height);
 
 // Number of sensors in a file. InputError for an invalid scene, without reading meshes or
 // images.
