@@ -61,7 +61,7 @@ PathsCheck check_paths(const Scene& whole, const std::string& name, double step,
   if (scene.max_depth < 0 || scene.max_depth > kMostDepth) scene.max_depth = kMostDepth;
   refuse_moved_paths(scene, name);
   const Parameter parameter = find_parameter(scene, name);
-  DifferenceJob job{name, {}, {}};
+  DifferenceJob job{parameter, {}, {}};
   for (const double share : kSteps) job.steps.push_back(share * parameter.natural_step);
   if (step > 0) job.steps = {step};
   for (size_t k = 0; k < job.steps.size(); ++k) {

@@ -150,9 +150,9 @@ double largest_step(const Scene& scene, const Parameter& parameter) {
 std::vector<Moments::Batch> slope_of_blocks(const Scene& scene, const std::string& name,
                                             double reach, int block, const RunSettings& settings,
                                             const std::optional<Blur>& blur) {
-  const DifferenceJob job{name, {0.5 * std::fabs(reach)}, {{1}}};
-  const CentralDifferences run = central_differences(
-      find_parameter(scene, name).moved(scene, 0.5 * reach), {job}, block, settings, false, blur);
+  const Scene middle = find_parameter(scene, name).moved(scene, 0.5 * reach);
+  const DifferenceJob job{find_parameter(middle, name), {0.5 * std::fabs(reach)}, {{1}}};
+  const CentralDifferences run = central_differences(middle, {job}, block, settings, false, blur);
   if (run.spp < settings.spp) return {};
   return run.estimates[0][0].blocks.kept();
 }
@@ -207,7 +207,7 @@ double find_check_step(const Scene& scene, const std::string& parameter, const W
   most = std::min(most, largest_step(scene, moved));
   double step = most, largest = step;
   for (int ladder = 0; ladder < kLadders; ++ladder) {
-    DifferenceJob job{parameter, {}, {}};
+    DifferenceJob job{moved, {}, {}};
     for (int k = kTrials - 1; k >= 0; --k) {
       const double trial = largest * std::pow(kFactor, -k);
       if (trial >= least || k == 0) job.steps.push_back(trial);

@@ -34,12 +34,9 @@ GradientResult run_blurred(const MethodType& method, const Scene& scene,
                            const GradientOptions& options, const RunSettings& settings) {
   const Stopwatch watch;
   const Blur blur = resolved(method.blurred_by(options.blur), scene);
-  std::vector<Parameter> parameters;
+  const std::vector<Parameter> parameters = parameters_of(scene, options);
   std::vector<BlurredNumber> derived;
-  for (const std::string& name : options.parameters) {
-    parameters.push_back(find_parameter(scene, name));
-    derived.push_back({parameters.back()});
-  }
+  for (const Parameter& parameter : parameters) derived.push_back({parameter});
   const auto passes = blurred_passes(scene, blur, derived, settings.threads);
   const EstimatorsAt at = [&](double u) {
     return EstimatorsAtTime{{}, blurred_passes(scene, blur, derived, settings.threads, u)};

@@ -89,7 +89,7 @@ Step find_step(const Scene& scene, const Parameter& parameter, size_t parameters
   }
   settings.least_spp = kPilotSamples;
   settings.seed = run.seed + 1;  // not the samples that the run will take
-  DifferenceJob job{parameter.name, steps_to_try(scene, parameter), {}};
+  DifferenceJob job{parameter, steps_to_try(scene, parameter), {}};
   const size_t count = job.steps.size();
   if (count < 2) return {{resolved_step(scene, parameter)}, "what floats resolve"};
   job.combinations = steps_and_changes(count);
@@ -151,11 +151,11 @@ ParameterGradient to_gradient(const std::string& name, DifferenceEstimate& estim
 DifferencePlan plan_differences(const Scene& scene, const GradientOptions& options,
                                 const RunSettings& settings, double rays) {
   DifferencePlan plan;
-  const size_t parameters = options.parameters.size();
-  for (const std::string& name : options.parameters) {
+  const std::vector<Parameter> parameters = parameters_of(scene, options);
+  for (const Parameter& parameter : parameters) {
     plan.steps.push_back(options.step > 0 ? Step{{options.step}, "the user"}
-                                          : find_step(scene, find_parameter(scene, name),
-                                                      parameters, rays, settings, plan.seconds));
+                                          : find_step(scene, parameter, parameters.size(), rays,
+                                                      settings, plan.seconds));
   }
   return plan;
 }
@@ -172,10 +172,11 @@ GradientResult run_planned(const std::string& term, const Scene& scene,
                            const DifferencePlan& plan, const Stopwatch& watch) {
   std::vector<DifferenceJob> jobs;
   GradientResult result;
+  const std::vector<Parameter> parameters = parameters_of(scene, options);
   for (size_t k = 0; k < plan.steps.size(); ++k) {
-    const Parameter parameter = find_parameter(scene, options.parameters[k]);
+    const Parameter& parameter = parameters[k];
     const auto& [forecast, found_by, samples] = plan.steps[k];
-    jobs.push_back({parameter.name, {forecast.step}, {{1}}});
+    jobs.push_back({parameter, {forecast.step}, {{1}}});
     warn_of_rounding(scene, parameter, forecast.step, result.warnings);
     const std::string of = plan.steps.size() > 1 ? " of " + parameter.name : "";
     result.settings.push_back({"step" + of, forecast.step});
@@ -191,7 +192,7 @@ GradientResult run_planned(const std::string& term, const Scene& scene,
   }
   CentralDifferences run = central_differences(scene, jobs, options.block, rest, true);
   for (size_t k = 0; k < jobs.size(); ++k) {
-    result.parameters.push_back(to_gradient(jobs[k].parameter, run.estimates[k][0]));
+    result.parameters.push_back(to_gradient(jobs[k].parameter.name, run.estimates[k][0]));
   }
   result.radiance = std::move(run.radiance);
   result.terms = {{term, true, true, 1, {}, run.cost}};

@@ -39,7 +39,7 @@ std::vector<double> mean_of_two(const std::vector<double>& a, const std::vector<
 // environment change these draw the same directions.
 void append_moved(const Scene& scene, const DifferenceJob& job, bool same_paths,
                   std::vector<Scene>& moved) {
-  const Parameter parameter = find_parameter(scene, job.parameter);
+  const Parameter& parameter = job.parameter;
   const size_t first = moved.size();
   for (const double step : job.steps) {
     for (const double h : {step, -step}) moved.push_back(parameter.moved(scene, h));
@@ -147,8 +147,9 @@ DifferenceResult finite_differences(const Scene& scene, const std::string& param
                                     int block, const RunSettings& settings,
                                     const std::optional<Blur>& blur) {
   CentralDifferences run = central_differences(
-      scene, {{parameter, {step, 2 * step}, {{1, 0}, {0, 1}, {4.0 / 3, -1.0 / 3}}}}, block,
-      settings, false, blur);
+      scene,
+      {{find_parameter(scene, parameter), {step, 2 * step}, {{1, 0}, {0, 1}, {4.0 / 3, -1.0 / 3}}}},
+      block, settings, false, blur);
   auto& estimates = run.estimates[0];
   return {std::move(estimates[0]), std::move(estimates[1]),
           std::move(estimates[2]), run.spp,

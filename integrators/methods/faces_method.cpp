@@ -26,16 +26,6 @@ RunSettings settings_for(FilmPoints points, RunSettings settings) {
   return settings;
 }
 
-namespace {
-
-std::vector<Parameter> parameters_of(const Scene& scene, const GradientOptions& options) {
-  std::vector<Parameter> parameters;
-  for (const auto& name : options.parameters) parameters.push_back(find_parameter(scene, name));
-  return parameters;
-}
-
-}  // namespace
-
 std::vector<std::string> trace_faces(const Scene& scene, const GradientOptions& options,
                                      const NonFinite::SampleId& place) {
   check_pixel(scene.film, place);

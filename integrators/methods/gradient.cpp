@@ -39,12 +39,11 @@ void check_selection(const Scene& scene, const GradientOptions& options) {
 }
 
 void identify(const Scene& scene, const GradientOptions& options, BatchStore& store) {
-  std::vector<Parameter> parameters;
-  for (const std::string& name : options.parameters) {
-    parameters.push_back(find_parameter(scene, name));
-  }
+  const std::vector<Parameter> parameters = parameters_of(scene, options);
+  std::string names = join(options.parameters);
+  for (const Parameter& found : options.found) names += " " + found.unit;
   store.identify("method", options.method.name());
-  store.identify("parameters", join(options.parameters));
+  store.identify("parameters", names);
   store.identify("velocities", fingerprint(scene, parameters));
   store.identify("terms", join(options.terms));
   store.identify("samples", !options.samples ? (options.uniform_samples ? "uniform" : "auto")
@@ -55,6 +54,15 @@ void identify(const Scene& scene, const GradientOptions& options, BatchStore& st
 }
 
 }  // namespace
+
+std::vector<Parameter> parameters_of(const Scene& scene, const GradientOptions& options) {
+  if (!options.found.empty()) return options.found;
+  std::vector<Parameter> parameters;
+  for (const std::string& name : options.parameters) {
+    parameters.push_back(find_parameter(scene, name));
+  }
+  return parameters;
+}
 
 bool SampleCounts::operator==(const SampleCounts& other) const {
   for (size_t t = 0; t < std::max(size(), other.size()); ++t) {
@@ -102,11 +110,7 @@ GradientResult gradient(const Scene& scene, const GradientOptions& options,
   GradientResult result = method.run(method, scene, options, settings);
   result.method = method.name;
   check_shading(scene, result);
-  const auto moves = [&](const std::string& name) {
-    const Parameter parameter = find_parameter(scene, name);
-    return moved_in(scene, {&parameter, 1}).any();
-  };
-  if (options.points == FilmPoints::kFaces || std::ranges::none_of(options.parameters, moves))
+  if (options.points == FilmPoints::kFaces || !moved_in(scene, parameters_of(scene, options)).any())
     return result;
   warn_of_hair_gaps(scene, static_cast<double>(result.spp), settings.threads, result.warnings);
   return result;

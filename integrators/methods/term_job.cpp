@@ -62,12 +62,6 @@ constexpr double kSetupShare = 1.0 / 32;
 // When a pilot looks at a scene that moves: at the reference time velocities change nothing.
 constexpr double kPilotTime = 0.75;  // not tuned
 
-std::vector<Parameter> find_parameters(const Scene& scene, const std::vector<std::string>& names) {
-  std::vector<Parameter> parameters;
-  for (const std::string& name : names) parameters.push_back(find_parameter(scene, name));
-  return parameters;
-}
-
 // A whole run of one method.
 class TermJob {
  public:
@@ -76,7 +70,7 @@ class TermJob {
       : scene_(scene),
         options_(options),
         method_(method),
-        parameters_(find_parameters(scene, options.parameters)),
+        parameters_(limn::parameters_of(scene, options)),
         moving_(needs_times(scene, parameters_)),
         // What a pilot finds of turns and of positions on the film holds for its own time alone.
         moves_film_(method.moves_film && scene.camera.is_pinhole() && !moving_),

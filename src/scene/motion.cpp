@@ -57,6 +57,11 @@ std::optional<Parameter> Motion::part(const Scene&, const Parameter&, const std:
   return std::nullopt;
 }
 
+std::optional<Parameter> Motion::along(const Scene&, const Parameter&,
+                                       const std::vector<double>&) const {
+  return std::nullopt;
+}
+
 std::string Motion::parts(const std::string& name) const { return name; }
 
 void check_numbers(const Scene& scene, const std::string& name, const std::vector<double>& value,

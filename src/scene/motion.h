@@ -34,6 +34,10 @@ class Motion {
   // for an unknown suffix; InputError for an invalid one.
   virtual std::optional<Parameter> part(const Scene& scene, const Parameter& whole,
                                         const std::string& rest) const;
+  // As limn::along(), of a direction with as many finite numbers as the whole; nothing of what is
+  // one number.
+  virtual std::optional<Parameter> along(const Scene& scene, const Parameter& whole,
+                                         const std::vector<double>& direction) const;
   // How to name a component of the array `name`, for messages.
   virtual std::string parts(const std::string& name) const;
 };

@@ -227,4 +227,21 @@ Parameter find_parameter(const Scene& scene, const std::string& name) {
                        " numbers, and one is wanted: " + parameter.motion->parts(name));
 }
 
+Parameter along(const Scene& scene, const Parameter& whole, const std::vector<double>& direction) {
+  const auto fail = [&](const std::string& text) {
+    throw InputError({scene.file},
+                     fmt::format("the direction of parameter \"{}\" {}", whole.name, text));
+  };
+  if (direction.size() != whole.numbers()) {
+    fail(fmt::format("has {} numbers, not {}", whole.numbers(), direction.size()));
+  }
+  for (size_t i = 0; i < direction.size(); ++i) {
+    if (!std::isfinite(direction[i])) fail(fmt::format("is not finite (number {}, from 0)", i));
+  }
+  auto field = whole.motion->along(scene, whole, direction);
+  if (!field) fail("would be one number: scale the derivative in its place");
+  field->name = whole.name;
+  return *field;
+}
+
 }  // namespace limn

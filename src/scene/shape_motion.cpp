@@ -175,7 +175,18 @@ class VertexField final : public ShapeMotion {
   std::vector<Vec3d> field_;  // V
 };
 
-// Reads one vector per vertex. Copies of a vertex must not separate and tear the mesh.
+// Copies of a vertex must not separate and tear the mesh.
+void check_copies(const std::string& file, const Shape& shape, const std::vector<Vec3d>& field) {
+  for (size_t i = 0; i < field.size(); ++i) {
+    const uint32_t first = shape.mesh.weld[i];
+    if (field[i] == field[first]) continue;
+    throw InputError({file}, "vertices " + std::to_string(first) + " and " + std::to_string(i) +
+                                 " (counted from 0) of \"" + shape.id +
+                                 "\" are at the same position but move apart");
+  }
+}
+
+// Reads one vector per vertex.
 std::vector<Vec3d> read_field(const Shape& shape, const std::string& file) {
   const Mesh& mesh = shape.mesh;
   std::vector<Vec3d> v = read_vertex_vectors(file);
@@ -184,12 +195,7 @@ std::vector<Vec3d> read_field(const Shape& shape, const std::string& file) {
                                  " vectors, but the mesh of \"" + shape.id + "\" has " +
                                  std::to_string(mesh.positions.size()) + " vertices");
   }
-  for (size_t i = 0; i < v.size(); ++i) {
-    if (v[i] == v[mesh.weld[i]]) continue;
-    throw InputError({file}, "vertices " + std::to_string(mesh.weld[i]) + " and " +
-                                 std::to_string(i) + " (counted from 0) of \"" + shape.id +
-                                 "\" are at the same position but move apart");
-  }
+  check_copies(file, shape, v);
   return v;
 }
 
@@ -230,6 +236,15 @@ class VertexArray final : public ShapeMotion {
     }
     shape.mesh = moved_mesh(shape.mesh, std::move(positions), shape.where, warnings);
     shape.pivot.reset();
+  }
+  std::optional<Parameter> along(const Scene& scene, const Parameter&,
+                                 const std::vector<double>& direction) const override {
+    std::vector<Vec3d> field;
+    for (size_t i = 0; i < direction.size(); i += 3) {
+      field.push_back({direction[i], direction[i + 1], direction[i + 2]});
+    }
+    check_copies(scene.file, scene.shape(shape_), field);
+    return vertex_field(scene, shape_, std::move(field));
   }
   std::string parts(const std::string& name) const override {
     return "\"" + name + ":FILE\" for a field of vectors, \"" + name + ".0.x\" for one number";
@@ -291,6 +306,13 @@ class VertexDisplacement final : public ShapeMotion {
     check_vertex(scene, whole.name + rest, *vertex, whole.size);
     return Parameter{whole.name + rest, whole.unit, whole.natural_step, 1,
                      one_component(held(scene), static_cast<size_t>(*vertex))};
+  }
+  std::optional<Parameter> along(const Scene& scene, const Parameter&,
+                                 const std::vector<double>& direction) const override {
+    std::vector<Vec3d> field = directions(scene);
+    for (size_t i = 0; i < field.size(); ++i) field[i] = field[i] * direction[i];
+    check_copies(scene.file, scene.shape(shape_), field);
+    return vertex_field(scene, shape_, std::move(field));
   }
   std::string parts(const std::string& name) const override {
     return "\"" + name + ".0\" for one number";

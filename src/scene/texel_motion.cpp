@@ -117,6 +117,12 @@ class TexelArray final : public TexelMotion {
     for (size_t i = 0; i < value.size(); ++i) texels.data[i] = static_cast<float>(value[i]);
     texel_map(scene)->set_texels(texels);
   }
+  std::optional<Parameter> along(const Scene&, const Parameter& whole,
+                                 const std::vector<double>& direction) const override {
+    Image image(static_cast<int>(whole.array[1]), static_cast<int>(whole.array[0]), 3);
+    for (size_t i = 0; i < direction.size(); ++i) image.data[i] = static_cast<float>(direction[i]);
+    return field(whole, image);
+  }
   std::string parts(const std::string& name) const override {
     return "\"" + name + ":FILE\" for a map of changes, \"" + name + ".0.0.r\" for one number";
   }

@@ -1,4 +1,6 @@
 // Parameters of BSDFs and emitters: values to which the step is added, and where delta lights are.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -15,15 +17,17 @@ using Values = std::function<ParameterRef(Scene&)>;
 
 class ValueMotion final : public Motion {
  public:
-  explicit ValueMotion(Values values, const Moved& moved = {})
-      : values_(std::move(values)), moved_(moved) {}
+  // weights: how far each value goes in a step; none: as far as the step.
+  explicit ValueMotion(Values values, const Moved& moved = {}, std::vector<double> weights = {})
+      : values_(std::move(values)), moved_(moved), weights_(std::move(weights)) {}
   Moved moved() const override { return moved_; }
   void seed(Scene& scene, int lane, size_t) const override {
-    for (Dual* v : values_(scene).values) v->d[lane] += 1;
+    const ParameterRef here = values_(scene);
+    for (size_t k = 0; k < here.values.size(); ++k) here.values[k]->d[lane] += weight(k);
   }
   void move(Scene& scene, double step, size_t) const override {
     const ParameterRef here = values_(scene);
-    for (Dual* v : here.values) v->v += step;
+    for (size_t k = 0; k < here.values.size(); ++k) here.values[k]->v += weight(k) * step;
     if (here.changed) here.changed();
   }
   std::vector<double> numbers(const Scene& scene) const override {
@@ -57,10 +61,25 @@ class ValueMotion final : public Motion {
     });
     return one;
   }
+  std::optional<Parameter> along(const Scene&, const Parameter& whole,
+                                 const std::vector<double>& direction) const override {
+    if (!whole.colour) return std::nullopt;
+    Parameter one = whole;
+    one.colour = false;
+    one.unit = fmt::format("times ({})", fmt::join(direction, ", "));
+    double largest = 0;
+    for (const double v : direction) largest = std::max(largest, std::fabs(v));
+    if (largest > 0) one.natural_step /= largest;
+    one.motion = std::make_shared<ValueMotion>(values_, moved_, direction);
+    return one;
+  }
 
  private:
+  double weight(size_t k) const { return weights_.empty() ? 1 : weights_[k]; }
+
   Values values_;
   Moved moved_;
+  std::vector<double> weights_;
 };
 
 // The natural step is a hundredth of the largest value, or 0.01 if all are 0.

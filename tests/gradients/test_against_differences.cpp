@@ -241,8 +241,8 @@ Steps at_two_steps(const Scene& scene, const std::string& name, double wide, dou
                    int spp) {
   RunSettings settings;
   settings.spp = spp;
-  const CentralDifferences run =
-      central_differences(scene, {{name, {wide, narrow}, {{1, 0}, {0, 1}}}}, 0, settings);
+  const CentralDifferences run = central_differences(
+      scene, {{find_parameter(scene, name), {wide, narrow}, {{1, 0}, {0, 1}}}}, 0, settings);
   const Moments &at_wide = run.estimates[0][0].total, &at_narrow = run.estimates[0][1].total;
   Steps steps;
   for (size_t i = 0; i < at_wide.size(); ++i) {

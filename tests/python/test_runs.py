@@ -86,6 +86,27 @@ def test_gradient_has_the_programs_bits(folder, scene, program, threads, argumen
     assert same(gradient[name].stderr, limn.read_exr(folder / "program_stderr.exr"))
 
 
+@pytest.mark.parametrize("method, told", [("fd", "step found by"), ("fastest", "chosen")])
+def test_gradients_say_how_their_method_was_set_up(folder, scene, method, told):
+    words = ["gradient", str(folder / "scene.xml"), "--wrt", "tent.translate.y", "--spp", "16",
+             "--method", method, "-o", str(folder / "set_up.exr"), "--quiet", "--json"]
+    program = subprocess.run([os.environ["LIMN_PROGRAM"], *words, str(folder / "set_up.json")],
+                             check=False)
+    assert program.returncode == 0
+    moved = limn.gradient(scene, "tent.translate.y", 16, method=method)["tent.translate.y"]
+    assert moved.settings == json.loads((folder / "set_up.json").read_text())["settings"]
+    assert told in moved.settings and "settings" not in repr(moved)
+    assert limn.render(scene, 1).settings == {}
+
+
+def test_backward_says_which_method_ran(scene):
+    slopes = limn.backward(scene, np.ones((12, 16, 3)), "tent.translate.y", 2048)
+    found = slopes["tent.translate.y"].settings
+    assert set(found) == {"method", "pilot"} and found["method"] in limn.methods()
+    plain = limn.backward(scene, np.ones((12, 16, 3)), "tent.translate.y", 64, method="silhouettes")
+    assert plain["tent.translate.y"].settings == {}
+
+
 def test_what_a_camera_sees_looks_around(scene):
     with pytest.raises(limn.InputError, match='"bulb"'):
         limn.render(scene, method="rays", what="direct")

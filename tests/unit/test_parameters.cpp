@@ -90,11 +90,10 @@ std::vector<Dual> numbers(const Scene& scene) {
 // Central differences with step h have an error of curvature times h^2, and of the rounding of
 // positions to float (magnitude up to 4) over h, which normals of the sphere's small faces
 // multiply by one over the face's size.
-void expect_derivative(const Scene& scene, const std::string& name) {
+void expect_derivative(const Scene& scene, const Parameter& parameter) {
   const double h = 0x1p-7;
   const double bound = 8 * h * h + 16 * 0x1p-23 / h;
   Scene seeded = deep_copy(scene);
-  const Parameter parameter = find_parameter(scene, name);
   parameter.seed(seeded, 2);
   const std::vector<Dual> at = numbers(seeded);
   const std::vector<Dual> up = numbers(parameter.moved(scene, h));
@@ -103,11 +102,14 @@ void expect_derivative(const Scene& scene, const std::string& name) {
   double motion = 0;
   for (size_t i = 0; i < at.size(); ++i) {
     const double difference = (up[i].v - down[i].v) / (2 * h);
-    EXPECT_NEAR(at[i].d[2], difference, bound) << name << " number " << i;
+    EXPECT_NEAR(at[i].d[2], difference, bound) << parameter.name << " number " << i;
     EXPECT_EQ(at[i].d[0], 0);
     motion = std::max(motion, std::fabs(difference));
   }
-  EXPECT_GT(motion, 0.05) << name << " moves nothing";
+  EXPECT_GT(motion, 0.05) << parameter.name << " moves nothing";
+}
+void expect_derivative(const Scene& scene, const std::string& name) {
+  expect_derivative(scene, find_parameter(scene, name));
 }
 
 TEST_F(Parameters, DerivativesMatchMoves) {
@@ -119,6 +121,25 @@ TEST_F(Parameters, DerivativesMatchMoves) {
   expect_derivative(scene_, "tent.vertex_positions.4.z");  // a copy: its twin moves along
   expect_derivative(scene_, "tent.displacement.2");
   expect_derivative(scene_, "tent.displacement.4");
+}
+
+TEST_F(Parameters, DirectionsMoveAllNumbers) {
+  int colours = 0, arrays = 0;
+  for (const Parameter& p : list_parameters(scene_)) {
+    if (p.numbers() == 1) continue;
+    std::vector<double> direction(p.numbers());
+    for (size_t i = 0; i < direction.size(); ++i)
+      direction[i] = p.array.size() == 1 ? 1 : static_cast<double>(i % 3) - 0.25;
+    const Parameter field = along(scene_, find_parameter_or_array(scene_, p.name), direction);
+    EXPECT_EQ(field.name, p.name);
+    expect_derivative(scene_, field);
+    ++(p.colour ? colours : arrays);
+  }
+  EXPECT_GT(colours, 2);
+  EXPECT_GT(arrays, 2);
+  EXPECT_THROW(along(scene_, find_parameter_or_array(scene_, "tent.displacement"), {1}),
+               InputError);
+  EXPECT_THROW(along(scene_, find_parameter(scene_, "tent.scale"), {1}), InputError);
 }
 
 // Of all numbers of two scenes.

@@ -656,7 +656,8 @@ TEST(TimeLimit, GivesTheBitsOfARunWithThatManySamples) {
   expect_same(g.parameters[0].total, whole.parameters[0].total);
 
   const auto differences = [&](const RunSettings& settings) {
-    return central_differences(scene, {{"ball.translate.x", {0.01}, {{1}}}}, 8, settings, true);
+    return central_differences(scene, {{find_parameter(scene, "ball.translate.x"), {0.01}, {{1}}}},
+                               8, settings, true);
   };
   const CentralDifferences d = differences(limited);
   EXPECT_GE(d.spp, 1);

@@ -20,6 +20,11 @@ Array to_array(Numbers numbers, const std::vector<size_t>& shape) {
   return Array(nb::ndarray<nb::numpy, double>(owned->data(), shape.size(), shape.data(), owner));
 }
 
+std::vector<MethodSetting> settings_of(const BackwardResult& result) {
+  if (result.decision.empty()) return {};
+  return {{"method", result.method}, {"pilot", result.decision}};
+}
+
 Estimate to_estimate(const ParameterAdjoint& adjoint, const BackwardResult& result) {
   Numbers errors = variances(adjoint.moments);
   for (double& e : errors) e = std::sqrt(e);
@@ -28,7 +33,8 @@ Estimate to_estimate(const ParameterAdjoint& adjoint, const BackwardResult& resu
           result.spp,
           result.seconds,
           result.warnings,
-          true};
+          true,
+          settings_of(result)};
 }
 
 struct BackwardCall : RunCall {

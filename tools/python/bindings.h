@@ -53,6 +53,11 @@ class SceneHandle {
 // Does a parameter of this name move something along an axis?
 bool is_translation(const std::string& name);
 
+// The numbers of an array for a parameter, row by row. shape: that it must have, {} for any; an
+// attribute (1, N, 3) may be (N, 3), and a colour one number. InputError for another shape.
+std::vector<double> to_numbers(const Scene& scene, const Parameter& parameter,
+                               const std::vector<size_t>& shape, nb::handle array);
+
 // Each group adds its names to the module.
 nb::class_<SceneHandle> bind_scene(nb::module_& m);
 void bind_parameters(nb::module_& m, nb::class_<SceneHandle>& scene);
@@ -104,8 +109,11 @@ struct Estimate {
   double seconds = 0;
   std::vector<std::string> warnings;
   bool is_derivative = false;
+  std::vector<MethodSetting> settings = {};
 };
 Estimate to_estimate(const Moments& moments, const Film& film, int64_t spp, double seconds);
+// Of a parameter of the result.
+Estimate to_estimate(const ParameterGradient& g, const GradientResult& result, const Film& film);
 
 using Names = std::variant<std::string, std::vector<std::string>>;
 std::vector<std::string> to_list(const Names& names);

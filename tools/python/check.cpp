@@ -25,10 +25,7 @@ Check check_of(const SceneHandle& handle, const CheckOptions& options, const Run
     check.result = limn::check(*scene, options, settings);
   });
   CheckResult& r = check.result;
-  check.gradient = to_estimate(r.gradient.parameters.at(0).total, scene->film, r.gradient.spp,
-                               r.gradient.seconds);
-  check.gradient.warnings = r.gradient.warnings;
-  check.gradient.is_derivative = true;
+  check.gradient = to_estimate(r.gradient.parameters.at(0), r.gradient, scene->film);
   check.differences = to_estimate(r.differences.extrapolated.total, scene->film, r.differences.spp,
                                   r.differences.seconds);
   check.differences.is_derivative = true;
@@ -53,10 +50,7 @@ ExactCheck check_exactly(const SceneHandle& handle, const CheckOptions& options,
     check.result = check_faces(*scene, options, settings);
   });
   const GradientResult& gradient = check.result.gradient;
-  check.gradient =
-      to_estimate(gradient.parameters.at(0).total, scene->film, gradient.spp, gradient.seconds);
-  check.gradient.warnings = gradient.warnings;
-  check.gradient.is_derivative = true;
+  check.gradient = to_estimate(gradient.parameters.at(0), gradient, scene->film);
   warn_all(gradient.warnings);
   check_finite(check.result.non_finite, nb::cast(check));
   return check;

@@ -68,19 +68,6 @@ std::string shape_text(const std::vector<size_t>& shape) {
   return fmt::format("({}{})", fmt::join(shape, ", "), shape.size() == 1 ? "," : "");
 }
 
-// A colour may be one number, of all channels; an attribute (1, N, 3) may be (N, 3).
-void check_shape(const ParameterView& view, const nb::ndarray<const double, nb::c_contig>& value) {
-  const std::vector<size_t>& shape = view.parameter.array;
-  std::vector<size_t> given;
-  for (size_t k = 0; k < value.ndim(); ++k) given.push_back(value.shape(k));
-  if (shape.empty() || given == shape) return;
-  const bool flat = given.size() == 2 && shape.size() == 3 && shape[0] == 1;
-  if (flat && std::equal(given.begin(), given.end(), shape.begin() + 1)) return;
-  throw InputError({view.scene->file},
-                   fmt::format("parameter \"{}\" has shape {}, not {}", view.parameter.name,
-                               shape_text(shape), shape_text(given)));
-}
-
 // SHAPE of SHAPE.scale and SHAPE.rotate.x.
 std::string object_of(const std::string& name) {
   const std::string whole = name.substr(0, name.rfind('.'));
@@ -101,15 +88,13 @@ void set_place(SceneHandle& scene, const std::string& name, nb::handle value) {
 
 void assign(SceneHandle& scene, const std::string& name, nb::handle value) {
   if (names_place(scene.get(), name)) return set_place(scene, name, value);
-  const auto array = nb::cast<nb::ndarray<const double, nb::c_contig, nb::device::cpu>>(
-      as_array(value, "float64"));
-  std::vector<double> numbers(array.data(), array.data() + array.size());
+  std::vector<double> numbers;
   Parameter parameter;
   std::optional<double> moved;
   {
     const ParameterView view = find(scene, name);
     moved = view.moved;
-    check_shape(view, nb::ndarray<const double, nb::c_contig>(array));
+    numbers = to_numbers(scene.get(), view.parameter, view.parameter.array, value);
     parameter = view.parameter;
   }
   if (moved) {
@@ -222,6 +207,22 @@ void bind_mapping(nb::module_& m) {
 }
 
 }  // namespace
+
+std::vector<double> to_numbers(const Scene& scene, const Parameter& parameter,
+                               const std::vector<size_t>& shape, nb::handle value) {
+  const auto array = nb::cast<nb::ndarray<const double, nb::c_contig, nb::device::cpu>>(
+      as_array(value, "float64"));
+  const std::vector<double> numbers(array.data(), array.data() + array.size());
+  std::vector<size_t> given;
+  for (size_t k = 0; k < array.ndim(); ++k) given.push_back(array.shape(k));
+  if (shape.empty() || given == shape) return numbers;
+  const bool flat = given.size() == 2 && shape.size() == 3 && shape[0] == 1;
+  if (flat && std::equal(given.begin(), given.end(), shape.begin() + 1)) return numbers;
+  if (parameter.colour && given == std::vector<size_t>{1})
+    return std::vector<double>(3, numbers[0]);
+  throw InputError({scene.file}, fmt::format("parameter \"{}\" has shape {}, not {}",
+                                             parameter.name, shape_text(shape), shape_text(given)));
+}
 
 bool is_translation(const std::string& name) {
   for (const char* end : {".translate.x", ".translate.y", ".translate.z"}) {

@@ -153,6 +153,18 @@ void bind_render(nb::module_& m) {
       .def_prop_ro(
           "warnings", [](const Estimate& e) { return e.warnings; },
           "What the run had to say; Python's warnings told it, too.")
+      .def_prop_ro(
+          "settings",
+          [](const Estimate& e) {
+            nb::typed<nb::dict, std::string, std::variant<double, std::string>> settings;
+            for (const MethodSetting& s : e.settings)
+              settings[nb::cast(s.name)] = nb::cast(s.value);
+            return settings;
+          },
+          "How the method was set up, as `limn gradient --json` has it: of limn.gradient the step "
+          "of \"fd\" and a bound on its bias, what \"fastest\" chose, ...; of limn.backward the "
+          "method that ran and what its pilot found. Empty of images and where there was no "
+          "choice.")
       .def("__array__", to_numpy, nb::arg("dtype") = nb::none(), nb::arg("copy") = nb::none(),
            nb::sig("def __array__(self, dtype: object = None, copy: bool | None = None) -> "
                    "numpy.ndarray"))

@@ -133,6 +133,11 @@ Parameter vertex_field(const Scene& scene, ShapeId shape, std::vector<Vec3d> fie
 // like EMITTER.data:FILE.
 Parameter texel_field(const Scene& scene, const Parameter& texels, const Image& field);
 
+// The parameter that changes all numbers of an array or colour at once, each by the step times its
+// number in `direction`, row by row; it has the name of the whole. InputError for another count,
+// numbers that are not finite, and copies of a vertex that move apart.
+Parameter along(const Scene& scene, const Parameter& whole, const std::vector<double>& direction);
+
 // What parameters move. Values (colours, roughness, radiance, texels) are none of it: where nothing
 // moves, no edge of what is seen does, and derivatives need none.
 struct Moved {

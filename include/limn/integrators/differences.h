@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "limn/core/blur.h"
+#include "limn/core/parameter.h"
 #include "limn/core/scene.h"
 #include "limn/integrators/moments.h"
 #include "limn/integrators/run.h"
@@ -22,7 +23,7 @@ struct DifferenceEstimate {
 // What to compute for one parameter, from D_j = (I(+h_j) - I(-h_j)) / 2 h_j for steps h_j: weighted
 // sums of the D_j, combinations[k] holding a weight for every step.
 struct DifferenceJob {
-  std::string parameter;
+  Parameter parameter;
   std::vector<double> steps;
   std::vector<std::vector<double>> combinations;
 };

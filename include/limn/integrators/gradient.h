@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "limn/core/blur.h"
+#include "limn/core/parameter.h"
 #include "limn/core/scene.h"
 #include "limn/edgetree/edges.h"
 #include "limn/integrators/film_points.h"
@@ -52,6 +53,8 @@ struct WarpOptions {
 
 struct GradientOptions {
   std::vector<std::string> parameters;
+  // What these names stand for, if it was found before: fields of arrays in memory, say.
+  std::vector<Parameter> found;
   Method method{Task::kGradient};
   std::vector<std::string> terms;  // by name; none: all that the scene has
   // None: chosen for the least squared error after equal time, all parameters alike, by a pilot of
@@ -70,6 +73,9 @@ struct GradientOptions {
   WarpOptions warp;
   Blur blur;  // of methods that blur; 0: see resolved()
 };
+
+// options.found, or what the names stand for. InputError as find_parameter().
+std::vector<Parameter> parameters_of(const Scene& scene, const GradientOptions& options);
 
 // Derivative images of one parameter, crop_height by crop_width by 3, per unit of the parameter.
 struct ParameterGradient {
