@@ -93,6 +93,18 @@ const json& find_reference(const std::string& file) {
   throw InputError({file}, "has no reference");
 }
 
+// All that have exact values, and names of files where they are.
+std::vector<std::string> parameters_of(const json& reference) {
+  std::vector<std::string> names;
+  for (const json& p : reference["parameters"]) {
+    std::string name = p["name"];
+    const size_t colon = name.find(':');
+    if (colon != std::string::npos) name.insert(colon + 1, kFolder);
+    names.push_back(name);
+  }
+  return names;
+}
+
 // samples: none where the method is to choose them.
 void expect_exact(const std::string& method, const std::string& file,
                   const std::optional<SampleCounts>& samples, int spp = samples_per_pixel(),
@@ -103,12 +115,7 @@ void expect_exact(const std::string& method, const std::string& file,
   options.method = method;
   options.samples = samples;
   if (Method(method)->warps) options.warp = warp;
-  for (const json& p : reference["parameters"]) {
-    std::string name = p["name"];
-    const size_t colon = name.find(':');
-    if (colon != std::string::npos) name.insert(colon + 1, kFolder);
-    options.parameters.push_back(name);
-  }
+  options.parameters = parameters_of(reference);
   RunSettings settings;
   settings.spp = spp;
   settings.seed = 7;
@@ -219,6 +226,11 @@ std::vector<std::string> all_methods() {
   return names;
 }
 
+// A sampler of edges, whose other terms are those of `forest`.
+bool draws_alike(const MethodType& type) {
+  return !type.only_sum_fixed && type.name != "forest" && type.terms == Method("forest")->terms;
+}
+
 std::vector<std::tuple<std::string, std::string>> all_cases() {
   std::vector<std::tuple<std::string, std::string>> cases;
   size_t variants = 0;
@@ -229,12 +241,13 @@ std::vector<std::tuple<std::string, std::string>> all_cases() {
     variants += type.is_variant() ? 1 : 0;
     size_t at = 0;
     for (const json& reference : references()) {
-      // Where shading points see no edge move, a variant of a sampler has nothing to show, nor
-      // have warped directions. How variants draw is tested edge by edge (test_edge_samplers); that
+      // Where shading points see no edge move, samplers of edges do what `forest` does (see below),
+      // and warped directions have nothing to show. How variants draw is tested edge by edge (test_edge_samplers); that
       // a term takes what they say is the same code for all, and each is held against one scene in
       // four, another four than the one before. Variants of other kinds take every other scene.
       const bool sampler = type.is_variant() && !type.only_sum_fixed;
-      if ((sampler || type.warps) && !has_term(reference, "boundary")) continue;
+      if ((sampler || draws_alike(type) || type.warps) && !has_term(reference, "boundary"))
+        continue;
       const std::string file = reference["file"];
       if (!takes(type, file)) continue;
       if (type.is_variant() && (++at + variants) % (sampler ? 4 : 2) != 0) continue;
@@ -248,6 +261,36 @@ INSTANTIATE_TEST_SUITE_P(, ClosedForm, testing::ValuesIn(all_cases()), [](const 
   const std::string file = std::get<1>(test.param);
   return test_name(std::get<0>(test.param) + "_" + file.substr(0, file.find('.')));
 });
+
+// But for what rounding leaves of edges that do not move.
+TEST(ClosedFormAlike, SamplersDifferOnlyWhereShadingPointsSeeEdgesMove) {
+  size_t compared = 0;
+  for (const json& reference : references()) {
+    if (has_term(reference, "boundary")) continue;
+    GradientOptions options;
+    options.parameters = parameters_of(reference);
+    const Scene& scene = listed_scene(reference["file"]);
+    RunSettings settings;
+    settings.spp = 4;
+    settings.seed = 7;
+    options.method = "forest";
+    const GradientResult forest = gradient(scene, options, settings);
+    for (const MethodType& type : method_types()) {
+      if (!type.terms_can_be_left_out || !draws_alike(type)) continue;
+      options.method = type.name;
+      const GradientResult other = gradient(scene, options, settings);
+      for (size_t k = 0; k < options.parameters.size(); ++k) {
+        const Moments &a = other.parameters[k].total, &b = forest.parameters[k].total;
+        for (size_t i = 0; i < a.size(); ++i) {
+          EXPECT_NEAR(a.mean(i), b.mean(i), 1e-12 * (1 + std::fabs(b.mean(i))))
+              << type.name << " " << options.parameters[k];
+        }
+      }
+      ++compared;
+    }
+  }
+  EXPECT_GT(compared, 60u);
+}
 
 // With many rays and a wide kernel, what is left of the bias of warped-area sampling drowns in the
 // noise of these samples.
