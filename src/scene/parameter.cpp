@@ -63,6 +63,7 @@ std::string of_sensor(const Scene& scene, const std::string& name) {
                   [&](const Shape& shape) { return shape.id == name.substr(0, name.rfind('.')); });
   if (is_of_shape && name.ends_with(".positions")) advice = "they are called vertex_positions";
   if (is_of_shape && name.ends_with(".faces")) advice = "see mesh() and set_mesh() in Python";
+  if (name.ends_with(".film.size")) advice = "see resize() in Python";
   if (of_sensor(scene, name) == "sensor.x_fov" && scene.camera.x_factor != 1) {
     advice = "sensor.fov is along the file's fov_axis, which is not x";
   }

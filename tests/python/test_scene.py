@@ -256,7 +256,8 @@ def test_names_of_mitsuba_that_are_called_otherwise(scene):
     for name in ("nope.x_fov", "nope.positions", "nope.faces"):
         with pytest.raises(KeyError, match="nearest: "):
             other[name]
-    for name, advice in (("tent.positions", "called vertex_positions"), ("tent.faces", r"set_mesh\(\)")):
+    for name, advice in (("tent.positions", "called vertex_positions"), ("tent.faces", r"set_mesh\(\)"),
+                         ("sensor.film.size", r"resize\(\) in Python")):
         with pytest.raises(limn.UnknownParameterError, match=advice):
             scene[name]
     with pytest.raises(AttributeError, match="limn.load reads files"):
