@@ -242,9 +242,10 @@ std::vector<std::tuple<std::string, std::string>> all_cases() {
     size_t at = 0;
     for (const json& reference : references()) {
       // Where shading points see no edge move, samplers of edges do what `forest` does (see below),
-      // and warped directions have nothing to show. How variants draw is tested edge by edge (test_edge_samplers); that
-      // a term takes what they say is the same code for all, and each is held against one scene in
-      // four, another four than the one before. Variants of other kinds take every other scene.
+      // and warped directions have nothing to show. How variants draw is tested edge by edge
+      // (test_edge_samplers); that a term takes what they say is the same code for all, and each is
+      // held against one scene in four, another four than the one before. Variants of other kinds
+      // take every other scene.
       const bool sampler = type.is_variant() && !type.only_sum_fixed;
       if ((sampler || draws_alike(type) || type.warps) && !has_term(reference, "boundary"))
         continue;
