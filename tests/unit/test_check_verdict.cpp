@@ -588,8 +588,8 @@ TEST(CheckVerdict, ScaledTermsAreFoundAndNamed) {
       {"lamp_over_plane", "floor.rotate.x", "forest", "interior", 40960},
       {"lamp_in_beckmann", "sensor.translate.y", "forest", "boundary", 65536},
       {"half_hidden_lamp", "lamp.translate.x", "silhouettes", "direct", 49152},
-      {"lamps_in_view_box", "near.translate.x", "adaptive", "camera", 98304},
-      {"shadow_of_spot", "object.translate.x", "forest", "shadow", 327680},
+      {"crossing_in_view", "sensor.fov", "adaptive", "camera", 36864},
+      {"shadow_of_directional", "object.scale", "forest", "shadow", 73728},
   };
   const char* wanted = std::getenv("LIMN_SCALED_RUNS");
   const int count = wanted ? std::atoi(wanted) : 1;
