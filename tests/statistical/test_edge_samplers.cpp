@@ -405,31 +405,40 @@ TEST_P(EdgeSamplers, MissNoEdgeThatContributes) {
   }
 }
 
+// Which edge and which part of it, of all draws at once.
 TEST_P(EdgeSamplers, DensityAlongTheEdge) {
   Rng rng(16, 0, 0);
   const EdgeSamplerInput input = test_input(cube_mesh());
   const auto sampler = make(input);
   // Ablations draw along edges as their samplers do.
   const bool ablation = is_variant(GetParam());
-  const int queries = ablation ? 10 : 40, draws = ablation ? 1250 : 5000;
+  const int queries = ablation ? 10 : 40, draws = ablation ? 4500 : 18000;
   for (int i = 0; i < queries; ++i) {
     const EdgeQuery q = random_query(rng);
-    const auto first = sampler->sample(q, rng);
-    if (!first) continue;
-    const EdgeRef edge = first->edge;
-    constexpr int kBins = 20, kFine = 500;
-    std::vector<double> expected(kBins), observed(kBins);
-    for (int b = 0; b < kBins * kFine; ++b)  // jittered: unbiased whatever the density's jumps
-      expected[b / kFine] +=
-          sampler->pdf_t(q, edge, (b + rng.uniform()) / (kBins * kFine)) / (kBins * kFine);
-    double count = 0;
-    for (int k = 0; k < 100 * draws && count < draws; ++k) {
+    constexpr int kBins = 20, kFine = 100;
+    std::vector<double> expected;
+    std::vector<size_t> begin;  // of an object's cells
+    double sum = 0;
+    for_every_edge(input, [&](EdgeRef id) {
+      if (id.edge == EdgeId(0)) begin.push_back(expected.size());
+      const double probability = sampler->probability(q, id);
+      sum += probability;
+      expected.resize(expected.size() + kBins);
+      if (probability == 0) return;
+      double* const bins = &expected[expected.size() - kBins];
+      for (int b = 0; b < kBins * kFine; ++b)  // jittered: unbiased whatever the density's jumps
+        bins[b / kFine] += draws * probability / (kBins * kFine) *
+                           sampler->pdf_t(q, id, (b + rng.uniform()) / (kBins * kFine));
+    });
+    expected.push_back((1 - sum) * draws);  // failures
+    if (expected.back() < 1e-6) expected.back() = 0;
+    std::vector<double> observed(expected.size());
+    for (int k = 0; k < draws; ++k) {
       const auto s = sampler->sample(q, rng);
-      if (!s || !(s->edge == edge)) continue;
-      ++observed[std::min(kBins - 1, static_cast<int>(s->t * kBins))];
-      ++count;
+      const size_t part = s ? std::min(kBins - 1, static_cast<int>(s->t * kBins)) : 0;
+      ++(s ? observed[begin[s->edge.object.index()] + s->edge.edge.index() * kBins + part]
+           : observed.back());
     }
-    for (double& e : expected) e *= count;
     EXPECT_GT(test::chi_square_test(observed, expected).p_value, kSignificance) << i;
   }
 }
