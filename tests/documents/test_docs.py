@@ -131,7 +131,7 @@ class Docs(unittest.TestCase):
         types = ast.literal_eval(types)
         self.assertGreater(len(types["bsdf"] + types["emitter"]), 20)
         for tag in ("bsdf", "emitter"):
-            for name in types[tag]:
+            for name in (n for n in types[tag] if n != "null"):  # which has none
                 with self.subTest(tag=tag, type=name):
                     self.assertRegex(page, rf"{tag} {name}\s")
 
