@@ -121,12 +121,10 @@ void bind_operators(nb::class_<Estimate>& estimate) {
           },
           nb::arg("key"), nb::sig("def __getitem__(self, key: object) -> numpy.ndarray"))
       .def_prop_ro(
-          "shape",
-          [](const Estimate& e) { return nb::object(nb::cast(e.value).attr("shape")); },
+          "shape", [](const Estimate& e) { return nb::object(nb::cast(e.value).attr("shape")); },
           nb::sig("def shape(self) -> tuple[int, ...]"), "That of the value.")
       .def_prop_ro(
-          "dtype",
-          [](const Estimate& e) { return nb::object(nb::cast(e.value).attr("dtype")); },
+          "dtype", [](const Estimate& e) { return nb::object(nb::cast(e.value).attr("dtype")); },
           nb::sig("def dtype(self) -> numpy.dtype"), "That of the value.");
 }
 
