@@ -92,7 +92,10 @@ void add_camera(const Scene& scene, Hash& hash) {
   for (const auto& v : {c.origin, c.left, c.up, c.forward}) hash.add(v);
   for (const double v : {value(c.fov), c.x_factor, c.near_clip, c.far_clip, c.offset_x, c.offset_y})
     hash.add(v);
-  if (c.is_orthographic()) hash.add(c.half_width);
+  if (c.is_orthographic()) {
+    hash.add(c.half_width);
+    hash.add(c.half_height);
+  }
   if (c.has_lens()) {
     hash.add(value(c.aperture_radius));
     hash.add(value(c.focus_distance));

@@ -122,8 +122,8 @@ void check_task(const Method& method, Task task) {
 void refuse_differences(const Method& method) {
   if (!method->differs) return;
   throw InputError("the method \"" + method.name() +
-                   "\" takes finite differences, or may, which a check would compare with "
-                   "themselves: take another, as " +
+                   "\" takes finite differences (or may), and a check would compare them with "
+                   "themselves: choose another method, for example " +
                    Method(Task::kGradient).name());
 }
 

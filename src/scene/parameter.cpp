@@ -234,10 +234,11 @@ Parameter along(const Scene& scene, const Parameter& whole, const std::vector<do
                      fmt::format("the direction of parameter \"{}\" {}", whole.name, text));
   };
   if (direction.size() != whole.numbers()) {
-    fail(fmt::format("has {} numbers, not {}", whole.numbers(), direction.size()));
+    fail(fmt::format("must have {} numbers, but has {}", whole.numbers(), direction.size()));
   }
   for (size_t i = 0; i < direction.size(); ++i) {
-    if (!std::isfinite(direction[i])) fail(fmt::format("is not finite (number {}, from 0)", i));
+    if (!std::isfinite(static_cast<float>(direction[i])))
+      fail(fmt::format("is not finite in single precision (number {}, from 0)", i));
   }
   auto field = whole.motion->along(scene, whole, direction);
   if (!field) fail("would be one number: scale the derivative in its place");

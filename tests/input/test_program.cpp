@@ -310,8 +310,8 @@ TEST_F(Program, ChecksAnyMethodButDifferences) {
   for (const std::string method : {"fd", "fastest", "fastest:film=fixed"}) {
     EXPECT_EQ(refused(check + method + " --spp 2"),
               "error: the method \"" + method +
-                  "\" takes finite differences, or may, which a check would compare with "
-                  "themselves: take another, as adaptive\n");
+                  "\" takes finite differences (or may), and a check would compare them with "
+                  "themselves: choose another method, for example adaptive\n");
   }
 }
 

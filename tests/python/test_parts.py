@@ -65,3 +65,13 @@ def test_parts_that_do_not_fit_are_refused(scene):
         limn.part((1, 3), limn.gradient, scene, NAMES, seconds=1)
     with pytest.raises(limn.InputError, match="parts are made of backward, gradient, render"):
         limn.part((1, 3), limn.check, scene, NAMES[0])
+
+
+def test_parts_know_how_high_a_parallel_view_is():
+    low, high = (limn.load_string(f"""<scene version="3.0.0"><sensor type="orthographic">
+        <transform name="to_world"><scale x="2" y="{y}"/></transform>
+        <film type="hdrfilm"><integer name="width" value="4"/><integer name="height" value="4"/></film>
+        </sensor><emitter type="constant"/></scene>""") for y in (1, 4))
+    parts = [limn.part((k, 2), limn.render, s, spp=2) for k, s in ((1, low), (2, high))]
+    with pytest.raises(limn.InputError, match="another run than .*: scene is"):
+        limn.merge(parts, low)

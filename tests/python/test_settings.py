@@ -130,9 +130,12 @@ def test_depths_and_the_sampler_are_those_of_a_file(scene, folder):
 @pytest.mark.parametrize("name, value, text", [
     ("max_depth", 0, "max_depth: must be -1 .no limit. or at least 1"),
     ("max_depth", -2, "max_depth: must be -1"),
-    ("rr_depth", 0, "rr_depth: must be 1 or more"),
+    ("rr_depth", 0, "rr_depth: must lie between 1 and"),
     ("spp", 0, "spp: must lie between 1 and 1073741823"),
     ("spp", 2**30, "spp: must lie between 1 and 1073741823"),
+    ("spp", 2**40, "spp: must lie between 1 and 1073741823"),
+    ("rr_depth", 2**31, "rr_depth: must lie between 1 and 2147483647"),
+    ("max_depth", 2**31, "max_depth: must be"),
     ("seed", -1, "seed: must not be negative"),
 ])
 def test_settings_have_the_ranges_of_a_file(scene, name, value, text):

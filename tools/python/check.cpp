@@ -158,7 +158,8 @@ void bind_check(nb::module_& m) {
       m, "check", "Check | FacesCheck",
       "Compares a gradient with finite differences, both with their errors.\n\n"
       "A right gradient is accused once in ten thousand times. With points \"faces\" the exact "
-      "gradient of that image is compared with differences of it, and a FacesCheck comes back.");
+      "gradient of that image is compared with differences of it, and a FacesCheck comes back. "
+      "limn.InputError for the methods \"fd\" and \"fastest\", which take differences themselves.");
 }
 
 }  // namespace limn::python

@@ -3,8 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
-
 #include "limn/core/error.h"
 #include "limn/core/names.h"
 #include "limn/integrators/methods.h"
@@ -47,37 +45,27 @@ void add_samples(Arguments& arguments, std::optional<SampleCounts>& counts, bool
 
 namespace {
 
-Estimate scaled(Estimate estimate, double factor) {
-  if (factor == 1) return estimate;
-  const auto by = [](const Array& array, double x) {
-    const nb::module_ numpy = nb::module_::import_("numpy");
-    return nb::cast<Array>(numpy.attr("multiply")(array, x, nb::arg("dtype") = "float32"));
-  };
-  estimate.value = by(estimate.value, factor);
-  estimate.error = by(estimate.error, std::fabs(factor));
-  return estimate;
-}
-
 struct GradientCall : RunCall {
   Names names;
   std::vector<std::pair<std::string, nb::object>> directions;  // of names, in their place
-  std::vector<double> factors;                                 // of results
   GradientOptions options;
 
   void take(Arguments& a) {
     add_scene(a, scene);
-    a.add({"names", std::string(kNamesType) + " | collections.abc.Mapping[str, " + kArrayType + "]",
-           "",
-           "of numbers; a vertex is \"object.vertex_positions.7.x\", a field of vectors "
-           "\"object.vertex_positions:FILE\". {name: direction}: derivatives along directions, of "
-           "the shape of limn.Parameter, as (V, 3); of a number it is a factor.",
-           [this](nb::handle given) {
-             if (!nb::hasattr(given, "items")) return void(names = nb::cast<Names>(given));
-             const nb::object copied = nb::module_::import_("builtins").attr("dict")(given);
-             for (const auto& [name, direction] : nb::cast<nb::dict>(copied))
-               directions.emplace_back(nb::cast<std::string>(name), nb::borrow(direction));
-             names = std::vector<std::string>();
-           }});
+    a.add(
+        {"names", std::string(kNamesType) + " | collections.abc.Mapping[str, " + kArrayType + "]",
+         "",
+         "of numbers and colours; a vertex is \"object.vertex_positions.7.x\", a field of "
+         "vectors from a file \"object.vertex_positions:FILE\". Or {name: direction}, for arrays, "
+         "too: finite numbers of the shape Parameter.shape, as (V, 3); copies of a vertex move "
+         "together. A number's direction is 1.",
+         [this](nb::handle given) {
+           if (!nb::hasattr(given, "items")) return void(names = nb::cast<Names>(given));
+           const nb::object copied = nb::module_::import_("builtins").attr("dict")(given);
+           for (const auto& [name, direction] : nb::cast<nb::dict>(copied))
+             directions.emplace_back(nb::cast<std::string>(name), as_array(direction, "float64"));
+           names = std::vector<std::string>();
+         }});
     add_run(a, request, progress, true);
     visit_options(options, a);
     add_samples(a, options.samples, &options.uniform_samples);
@@ -85,34 +73,33 @@ struct GradientCall : RunCall {
   }
 
   void find_directions() {
-    const Scene& of = scene->get();
+    const auto held = scene->share();
+    const Scene& of = *held;
     for (const auto& [name, value] : directions) {
       const Parameter whole = find_parameter_or_array(of, name);
       const std::vector<double> numbers = to_numbers(of, whole, whole.shape(), value);
       const bool is_number = whole.numbers() == 1;
-      if (is_number && !(numbers.size() == 1 && std::isfinite(numbers[0]))) {
-        throw InputError({of.file}, fmt::format("the direction of parameter \"{}\" is one finite "
-                                                "number",
-                                                whole.name));
+      if (is_number && !(numbers.size() == 1 && numbers[0] == 1)) {
+        throw InputError({of.file},
+                         fmt::format("the direction of parameter \"{}\" must be 1, as it "
+                                     "is one number: scale its derivative in its place",
+                                     whole.name));
       }
       options.parameters.push_back(whole.name);
       options.found.push_back(is_number ? whole : along(of, whole, numbers));
-      factors.push_back(is_number ? numbers[0] : 1);
     }
   }
 
   nb::dict run(const Arguments& given) {
     given.refuse_samples(options.points, {"spp", "seconds", "samples"});
     options.parameters = to_list(names);
-    factors.resize(options.parameters.size(), 1);
     find_directions();
     const GradientResult result = result_of([&](const Scene& of, const RunSettings& settings) {
       return gradient(of, options, settings);
     });
     nb::dict estimates;
-    for (size_t k = 0; k < result.parameters.size(); ++k) {
-      const ParameterGradient& g = result.parameters[k];
-      estimates[nb::cast(g.name)] = nb::cast(scaled(to_estimate(g, result, film()), factors[k]));
+    for (const ParameterGradient& g : result.parameters) {
+      estimates[nb::cast(g.name)] = nb::cast(to_estimate(g, result, film()));
     }
     check_finite(result.non_finite, estimates);
     warn_all(result.warnings);
@@ -125,8 +112,8 @@ struct GradientCall : RunCall {
 void bind_gradient(nb::module_& m) {
   def<GradientCall>(
       m, "gradient", "dict[str, Estimate]",
-      "Derivative images, (H, W, 3) radiance per unit of each parameter, all from the same "
-      "samples.\n\n"
+      "Derivative images, float32 (H, W, 3), by parameter: radiance per unit of it, or along its "
+      "direction. All are from the same samples.\n\n"
       "With points \"faces\" that of the image that limn.render makes with them, exactly. Raises "
       "limn.UnknownParameterError (a KeyError), limn.InputError, limn.NonFiniteError.");
   m.def(

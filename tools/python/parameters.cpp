@@ -152,11 +152,12 @@ void bind_parameter(nb::module_& m) {
           "unit", [](const ParameterView& v) { return v.parameter.unit; },
           "Its unit: \"scene units\", \"radians\", ...; \"\" for plain numbers.")
       .def_prop_ro("shape", shape_tuple, nb::sig("def shape(self) -> tuple[int, ...]"),
-                   "Of limn.backward's derivative: () for a number, (3,) for a colour, (V, 3) for "
+                   "Of limn.backward's derivative and of directions in limn.gradient: () for a "
+                   "number, (3,) for a colour, (V, 3) for "
                    "vertex positions, (V,) for displacements, (H, W, 3) for the texels of an "
-                   "envmap or bitmap, (1, N, 3) for an attribute of a mesh. In limn.gradient all "
-                   "channels of a colour move alike (grey), and "
-                   "NAME.r, NAME.g, NAME.b move one of them.")
+                   "envmap or bitmap, (1, N, 3) for an attribute of a mesh. By its name alone, "
+                   "limn.gradient moves all channels of a colour alike (grey); NAME.r, NAME.g, "
+                   "NAME.b move one of them.")
       .def_prop_ro(
           "natural_step", [](const ParameterView& v) { return v.parameter.natural_step; },
           "A small step: about a hundredth of what changes the picture a lot.")

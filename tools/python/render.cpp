@@ -161,10 +161,10 @@ void bind_render(nb::module_& m) {
               settings[nb::cast(s.name)] = nb::cast(s.value);
             return settings;
           },
-          "How the method was set up, as `limn gradient --json` has it: of limn.gradient the step "
-          "of \"fd\" and a bound on its bias, what \"fastest\" chose, ...; of limn.backward the "
-          "method that ran and what its pilot found. Empty of images and where there was no "
-          "choice.")
+          "How the method was set up, the same for all parameters of a run: of limn.gradient what "
+          "`limn gradient --json` calls settings, as \"step\" of \"fd\" (in the parameter's unit) "
+          "and a bound on its bias; of limn.backward the method that ran and what its pilot found. "
+          "Empty of images.")
       .def("__array__", to_numpy, nb::arg("dtype") = nb::none(), nb::arg("copy") = nb::none(),
            nb::sig("def __array__(self, dtype: object = None, copy: bool | None = None) -> "
                    "numpy.ndarray"))

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <limits>
 #include <map>
 
@@ -133,14 +134,17 @@ void set_shading(SceneHandle& scene, const std::string& name) {
                     name == "mitsuba" ? ShadingModel::kMitsuba : ShadingModel::kContinuous);
 }
 
-void set_max_depth(SceneHandle& scene, int depth) {
-  if (depth < -1 || depth == 0) throw FieldError("max_depth", kDepthRange);
-  scene.edit().max_depth = depth;
+constexpr int kMostInt = std::numeric_limits<int>::max();
+
+void set_max_depth(SceneHandle& scene, int64_t depth) {
+  if (depth < -1 || depth == 0 || depth > kMostInt) throw FieldError("max_depth", kDepthRange);
+  scene.edit().max_depth = static_cast<int>(depth);
 }
 
-void set_rr_depth(SceneHandle& scene, int depth) {
-  if (depth < 1) throw FieldError("rr_depth", "must be 1 or more");
-  scene.edit().rr_depth = depth;
+void set_rr_depth(SceneHandle& scene, int64_t depth) {
+  if (depth < 1 || depth > kMostInt)
+    throw FieldError("rr_depth", fmt::format("must lie between 1 and {}", kMostInt));
+  scene.edit().rr_depth = static_cast<int>(depth);
 }
 
 // Of the scene and of its sensor among those of the file, where view() finds them.
@@ -150,11 +154,11 @@ void set_sampler(Scene& scene, const Set& set) {
   if (scene.sensor < scene.sensors.size()) set(scene.sensors[scene.sensor]);
 }
 
-void set_spp(SceneHandle& scene, int spp) {
-  constexpr int kMost = std::numeric_limits<int>::max() / 2;
+void set_spp(SceneHandle& scene, int64_t spp) {
+  constexpr int kMost = kMostInt / 2;
   if (spp < 1 || spp > kMost)
     throw FieldError("spp", fmt::format("must lie between 1 and {}", kMost));
-  set_sampler(scene.edit(), [=](auto& sampled) { sampled.sample_count = spp; });
+  set_sampler(scene.edit(), [=](auto& sampled) { sampled.sample_count = static_cast<int>(spp); });
 }
 
 void set_seed(SceneHandle& scene, int64_t seed) {
@@ -171,29 +175,40 @@ void bind_settings(nb::class_<SceneHandle>& scene) {
   scene
       .def(
           "resize",
-          [](SceneHandle& s, int width, int height) { resize_film(s.edit(), width, height); },
+          [](SceneHandle& s, int64_t width, int64_t height) {
+            const auto pixels = [](int64_t n) {
+              return static_cast<int>(std::clamp(n, int64_t{-1}, int64_t{kMostInt}));
+            };
+            resize_film(s.edit(), pixels(width), pixels(height));
+          },
           nb::arg("width"), nb::arg("height"),
-          "Gives the sensor a film of another size in pixels, as Mitsuba's film.size does.\n\n"
-          "What the camera sees across stays. So images are those of a file with this size and "
-          "fov_axis \"x\", to the bit. limn.InputError for films with a crop window.")
+          "Gives the scene's sensor a film of width x height pixels, as a change of Mitsuba's "
+          "film.size does.\n\n"
+          "The horizontal field of view stays, the vertical one follows. Where the file's fov_axis "
+          "is \"x\" (the default), images are those of the file with this size, to the bit. "
+          "limn.InputError, and nothing changes, for crop windows and sizes that the file could "
+          "not have.")
       .def_prop_rw(
           "max_depth", [](const SceneHandle& s) { return s.get().max_depth; }, set_max_depth,
-          "Most segments of a path, as in Mitsuba: 1 emission alone, 2 direct light, -1 no limit.")
+          "The longest paths in segments, as in Mitsuba: 1 emission alone, 2 direct light as well, "
+          "-1 no limit. limn.InputError for others below 1.")
       .def_prop_rw(
           "rr_depth", [](const SceneHandle& s) { return s.get().rr_depth; }, set_rr_depth,
-          "The depth from which on Russian roulette ends paths, from 1 on.")
+          "The depth of paths from which Russian roulette may end them: at least 1.")
       .def_prop_rw(
           "hide_emitters", [](const SceneHandle& s) { return s.get().hide_emitters; },
           [](SceneHandle& s, bool hide) { s.edit().hide_emitters = hide; },
-          "Does the camera see through shapes that emit, and no environment?")
+          "True if the camera looks through shapes that emit, and sees black in place of the "
+          "environment.")
       .def_prop_rw(
           "spp", [](const SceneHandle& s) { return s.get().sample_count; }, set_spp,
-          "Samples per pixel of runs that are given no spp, from 1 on.")
+          "Samples per pixel where a call gives no spp: at least 1.")
       .def_prop_rw(
           "seed", [](const SceneHandle& s) { return s.get().seed; }, set_seed,
-          "The seed of runs that are given none, from 0 on.")
+          "The seed where a call gives none: at least 0.")
       .def("__reduce__", refuse_pickle,
-           nb::sig("def __reduce__(self) -> str | tuple[typing.Any, ...]"));
+           nb::sig("def __reduce__(self) -> str | tuple[typing.Any, ...]"),
+           "Raises TypeError: scenes do not pickle. Load them in each process.");
 }
 
 std::vector<std::string> shape_ids(const SceneHandle& scene) {

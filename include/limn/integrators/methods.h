@@ -54,7 +54,7 @@ struct MethodType {
   bool warps = false;                               // it takes GradientOptions::warp
   std::optional<BlurWeights> blurs = std::nullopt;  // its faces are blurred: it takes a Blur
   bool particles = false;                           // Blur::particles
-  bool differs = false;  // it takes finite differences, or may: none can be held against it
+  bool differs = false;  // it takes finite differences, or may: `check` refuses it
   bool biased = false;   // its mean is not the derivative, however many samples it takes
   // InputError, with the place, for a scene that the method cannot take; null: it takes all.
   void (*check)(const Scene&) = nullptr;
@@ -83,7 +83,8 @@ const std::vector<MethodType>& method_types();
 // Names of those that do a task.
 std::vector<std::string> method_names(Task task);
 
-// InputError for a method that differences cannot be held against.
+// InputError for a method that takes finite differences, or may: `check` would compare these with
+// themselves.
 void refuse_differences(const Method& method);
 // InputError if the options are not the defaults and none of the methods takes them.
 void check_warp(const WarpOptions& warp, const std::vector<Method>& methods);

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -51,7 +52,8 @@ def part(
         raise InputError(f"{function.__name__}: parts are made of {', '.join(_FUNCTIONS)}")
     writer = PartWriter(*of)
     function(scene, *arguments, threads=threads, progress=progress, _store=writer, **keywords)
-    return Part(*of, function.__name__, arguments, keywords, writer.bytes())
+    given = copy.deepcopy((arguments, keywords))  # a later change would be one of the run
+    return Part(*of, function.__name__, *given, writer.bytes())
 
 
 def merge(parts: Sequence[Part], scene: Scene, threads: int = 0) -> Any:
