@@ -118,7 +118,8 @@ ForwardSums forward_sums(const Scene& scene, std::span<const Parameter> paramete
                          const RunSettings& settings) {
   check_task(options.method, Task::kBackward);
   const ReverseMethod& method = *options.method->reverse;
-  const auto& [sampler, closed] = std::tie(method.sampler, method.closed);
+  const EdgeSamplerType sampler = method.sampler;
+  const bool closed = method.closed;
   const std::vector<std::string>& terms = options.terms;
   const std::vector<const TermType*> types = terms_of(scene, sampler, closed);
   std::vector<bool> computed;

@@ -84,7 +84,7 @@ void DirectEdges::list(const EdgeQuery& emitters, const EdgeQuery& patches, doub
     sampler_.list_outlines(query, *cone, listed);
     cut_edges(edges_, query, *cone, listed, pieces);
     listed_here.pieces += pieces.size();
-    const auto is_own = [&](const EdgePiece& piece) {
+    const auto is_own = [&, k = k](const EdgePiece& piece) {
       return piece.edge.object == regions_.shape(k);
     };
     const bool small = regions_.hull(k).radius < kSmall * length(regions_.hull(k).center - query.p);

@@ -2,6 +2,7 @@
 #include "integrators/terms/gloss_lines.h"
 
 #include <algorithm>
+#include <span>
 #include <utility>
 
 #include "integrators/edges/near_faces.h"
@@ -101,8 +102,9 @@ std::optional<GlossLines::Line> GlossLines::draw(double u, Rng& rng, const LensP
 // to q: to know it would take a descent.
 GlossLines::Share GlossLines::share(const Line& line) const {
   const auto key = [](EdgeRef edge) { return std::pair(edge.object.index(), edge.edge.index()); };
-  const auto same = std::ranges::equal_range(lit_, key(line.edge), {},
-                                             [&](const Lit& lit) { return key(lit.edge); });
+  const auto of_lit = [&](const Lit& lit) { return key(lit.edge); };
+  const std::span<const Lit> same(std::ranges::lower_bound(lit_, key(line.edge), {}, of_lit),
+                                  std::ranges::upper_bound(lit_, key(line.edge), {}, of_lit));
   if (same.empty()) return {};
   const Vec3d x = position(line.edge, line.t), way = line.vertex.q - x;
   const double r = length(way);

@@ -28,8 +28,7 @@ class AreaLight final : public Light {
     // Equal to `pdf`, without normalising the normal.
     const double density = distance * distance * of_area * length(n) * probability / facing;
     if (!(density > 0)) return {};
-    return std::optional<LightSample>(std::in_place, wo, distance, density, FaceRef{id_, face},
-                                      this);
+    return LightSample{wo, distance, density, FaceRef{id_, face}, this};
   }
   double pdf(const Vec3d& p, const LightView& view, double probability) const override {
     const double cosine = std::fabs(dot(view.n_g, view.wo));

@@ -590,10 +590,12 @@ class EmbreeTracer final : public RayTracer {
     }
     const auto& [center, axes, half] = *frame;
     const Owned<RTCScene> own = make_scene(quality());
-    const Owned<RTCGeometry> triangles = make_triangles(id, [&](const Vec3d& x) {
+    // Named, as Clang before 16 captures no structured bindings by itself.
+    const auto along_axes = [&center = center, &axes = axes](const Vec3d& x) {
       const Vec3d arm = x - center;
       return Vec3d{dot(axes[0], arm), dot(axes[1], arm), dot(axes[2], arm)};
-    });
+    };
+    const Owned<RTCGeometry> triangles = make_triangles(id, along_axes);
     attach(own.get(), triangles.get(), 0);
     commit(own.get(), threads);
     return make_instance(own.get(), {cast<float>(axes[0]), cast<float>(axes[1]),

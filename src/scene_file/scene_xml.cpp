@@ -605,7 +605,7 @@ void shorten(std::vector<std::string>& warnings) {
   }
   for (const auto& [kind, members] : kinds) {
     if (members.size() < 4) continue;
-    const auto place = [&](size_t k) {  // without its folder
+    const auto place = [&, &members = members](size_t k) {  // without its folder
       const std::string where = warnings[members[k]].substr(0, warnings[members[k]].find(kMark));
       return where.substr(where.rfind('/') + 1);
     };
