@@ -21,8 +21,8 @@ struct ReversePlan {
 // With the method that stands in for `adaptive` where there is no pilot; other methods stay.
 BackwardOptions without_pilot(const BackwardOptions& options);
 
-// Whether a run lists silhouettes for which pilots predict so much squared error x work, against
-// what they predict for `forest`.
+// Whether `adaptive` lists silhouettes. listed, drawn: squared error x work that the pilot predicts
+// for lists of silhouettes and for edges drawn from the forest.
 bool lists_silhouettes(double listed, double drawn);
 
 // options: of the method `adaptive` or another; then, and where samples, terms or uniform pixels

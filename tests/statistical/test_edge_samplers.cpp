@@ -430,6 +430,7 @@ TEST_P(EdgeSamplers, DensityAlongTheEdge) {
         bins[b / kFine] += draws * probability / (kBins * kFine) *
                            sampler->pdf_t(q, id, (b + rng.uniform()) / (kBins * kFine));
     });
+    ASSERT_EQ(begin.size(), input.objects.size());
     expected.push_back((1 - sum) * draws);  // failures
     if (expected.back() < 1e-6) expected.back() = 0;
     std::vector<double> observed(expected.size());

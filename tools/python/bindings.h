@@ -112,7 +112,7 @@ struct Estimate {
   std::vector<MethodSetting> settings = {};
 };
 Estimate to_estimate(const Moments& moments, const Film& film, int64_t spp, double seconds);
-// Of a parameter of the result.
+// The derivative image of one parameter of the result.
 Estimate to_estimate(const ParameterGradient& g, const GradientResult& result, const Film& film);
 
 using Names = std::variant<std::string, std::vector<std::string>>;

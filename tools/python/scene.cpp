@@ -147,7 +147,7 @@ void set_rr_depth(SceneHandle& scene, int64_t depth) {
   scene.edit().rr_depth = static_cast<int>(depth);
 }
 
-// Of the scene and of its sensor among those of the file, where view() finds them.
+// Applies `set` to the scene and to its selected sensor in `sensors`, so that view() keeps it.
 template <class Set>
 void set_sampler(Scene& scene, const Set& set) {
   set(scene);

@@ -50,7 +50,7 @@ struct Shape {
   std::string emitter_id;                     // "" if none
 };
 
-// Of max_depth; every reader says it so.
+// What messages say of a max_depth that is out of range.
 inline constexpr char kDepthRange[] = "must be -1 (no limit) or at least 1 (0 gives a black image)";
 
 // The content of a <sensor> element.

@@ -53,7 +53,8 @@ struct WarpOptions {
 
 struct GradientOptions {
   std::vector<std::string> parameters;
-  // What these names stand for, if it was found before: fields of arrays in memory, say.
+  // Unless empty: the parameters that the names stand for, one each, in the same order, as along()
+  // makes them of arrays in memory. Empty: the names are looked up in the scene.
   std::vector<Parameter> found;
   Method method{Task::kGradient};
   std::vector<std::string> terms;  // by name; none: all that the scene has

@@ -85,7 +85,7 @@ class PartWriter final : public BatchStore {
 
   // Samples per pixel of this part that are done.
   int64_t samples() const { return samples_; }
-  // Of the whole run; 0 before it begins.
+  // Samples per pixel that the whole run plans, all parts together; 0 before it begins.
   int spp() const { return spp_; }
   // Of a part in memory.
   std::string bytes() const;
